@@ -1,0 +1,39 @@
+"""The world that a robot is put into."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxbiped.geometry.boxes import Boxes
+
+CIRCLE, SQUARE = 0, 1  # kinds of landmark: a disc of 7.5 cm radius, a square of 5 cm (paper, 3.1)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Landmarks:
+    """`L` landmark slots, flat on the floor, whose place is known to the robot (paper, 2, condition 2)."""
+
+    x: Float[Array, "*B L"]  # [m]
+    y: Float[Array, "*B L"]  # [m]
+    yaw: Float[Array, "*B L"]  # [rad]; of no meaning for a circle
+    kind: Int[Array, "*B L"]  # CIRCLE or SQUARE
+    used: Bool[Array, "*B L"]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Arena:
+    """One arena: boxes, landmarks, start and goal. The floor is the rectangle [0, size_x] x [0, size_y] at z = 0."""
+
+    size_xy: Float[Array, "*B 2"]  # [m]
+    boxes: Boxes
+    landmarks: Landmarks
+    start_xyyaw: Float[Array, "*B 3"]  # [m, m, rad]
+    goal_xy: Float[Array, "*B 2"]  # [m]
+    floor_contrast: Float[Array, "*B"]  # texture contrast of the floor, 0 to 1
+    family: Int[Array, "*B"]  # index into `families.FAMILIES`; -1 for a scene written by hand
+    difficulty: Float[Array, "*B"]  # 0 (easy) to 1 (hard)

@@ -1,0 +1,27 @@
+"""The one exception that is meant for people: it becomes one line on stderr and exit status 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+
+class InputError(ValueError):
+    """Input that cannot be used.
+
+    Args:
+      message: what is allowed, in one clause.
+      file: the file that holds the bad value, if it came from one.
+      field: the dotted name of the field or the option.
+      value: the bad value itself.
+    """
+
+    def __init__(self, message: str, *, file: str | Path | None = None, field: str | None = None, value: object = None):
+        self.file, self.field, self.value = file, field, value
+        place = ": ".join(str(part) for part in (file, field) if part is not None)
+        got = f" (got {_short(value)})" if value is not None else ""
+        super().__init__(" ".join(f"{place + ': ' if place else ''}{message}{got}".split()))
+
+
+def _short(value: object, limit: int = 80) -> str:
+    text = repr(value)
+    return text if len(text) <= limit else text[: limit - 3] + "..."

@@ -1,0 +1,33 @@
+"""What one measurement gives: the same thing from every sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+from jaxtyping import Array, Bool, Float
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class View:
+    """Points of one measurement in the robot frame of the moment, as the robot believes its attitude to be.
+
+    The camera's true attitude may be off by a degree; the points then lie tilted, and `mapping` levels them.
+    """
+
+    x: Float[Array, "*B N"]  # [m] forward
+    y: Float[Array, "*B N"]  # [m] left
+    z: Float[Array, "*B N"]  # [m] up, from the supporting surface under the robot
+    weight: Float[Array, "*B N"]  # pixels that the point stands for; 0 where nothing was measured
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Sightings:
+    """Landmarks as seen from the robot: one slot per landmark of the arena, correspondence known."""
+
+    x: Float[Array, "*B L"]  # [m] forward, robot frame
+    y: Float[Array, "*B L"]  # [m] left, robot frame
+    sd: Float[Array, "*B L"]  # [m] standard deviation of x and of y
+    seen: Bool[Array, "*B L"]

@@ -1,0 +1,5 @@
+"""Shared by all tests: shapes of public signatures are checked at run time, here and nowhere else."""
+
+from jaxtyping import install_import_hook
+
+install_import_hook("jaxbiped", "beartype.beartype")
