@@ -2,4 +2,6 @@
 
 from jaxtyping import install_import_hook
 
-install_import_hook("jaxbiped", "beartype.beartype")
+import tests.typecheck  # noqa: F401
+
+install_import_hook("jaxbiped", "tests.typecheck.check")
