@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 
@@ -27,3 +28,35 @@ class Boxes:
     overhead: Bool[Array, "*B M"]  # hangs above the floor: part of the ceiling, not of the ground
     contrast: Float[Array, "*B M"]  # texture contrast, 0 (plain) to 1 (rich)
     used: Bool[Array, "*B M"]
+
+
+def ground_height(boxes: Boxes, x: Float[Array, "*S"], y: Float[Array, "*S"]) -> Float[Array, "*S"]:
+    """Height [m] of the ground at points (x, y) [m] of one arena: the highest top of floor-standing boxes, else 0.
+
+    Edges belong to the box. One arena: the leaves of `boxes` are [M].
+    """
+    height = jnp.zeros_like(x)
+    for m in range(boxes.x.shape[-1]):
+        here = covers(boxes, m, x, y) & ~boxes.overhead[m]
+        height = jnp.where(here, jnp.maximum(height, boxes.top[m]), height)
+    return height
+
+
+def ceiling_height(boxes: Boxes, x: Float[Array, "*S"], y: Float[Array, "*S"]) -> Float[Array, "*S"]:
+    """Height [m] of the ceiling at points (x, y) [m] of one arena: the lowest bottom of overhead boxes, else inf.
+
+    Edges belong to the box. One arena: the leaves of `boxes` are [M].
+    """
+    height = jnp.full_like(x, jnp.inf)
+    for m in range(boxes.x.shape[-1]):
+        here = covers(boxes, m, x, y) & boxes.overhead[m]
+        height = jnp.where(here, jnp.minimum(height, boxes.bottom[m]), height)
+    return height
+
+
+def covers(boxes: Boxes, m: int, x: Float[Array, "*S"], y: Float[Array, "*S"]) -> Bool[Array, "*S"]:
+    """Whether box slot `m` of one arena is in use and lies, in plan, at the points (x, y) [m]."""
+    cos, sin = jnp.cos(boxes.yaw[m]), jnp.sin(boxes.yaw[m])
+    dx, dy = x - boxes.x[m], y - boxes.y[m]
+    along, across = cos * dx + sin * dy, cos * dy - sin * dx
+    return boxes.used[m] & (jnp.abs(along) <= boxes.half_x[m]) & (jnp.abs(across) <= boxes.half_y[m])
