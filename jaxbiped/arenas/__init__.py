@@ -1,1 +1,17 @@
+"""The world: arenas, random families, and scenes written by hand."""
 
+from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
+from jaxbiped.arenas.families import FAMILIES, sample
+from jaxbiped.arenas.scene import SceneConfig, load_scene, to_arena
+
+__all__ = [
+    "CIRCLE",
+    "FAMILIES",
+    "SQUARE",
+    "Arena",
+    "Landmarks",
+    "SceneConfig",
+    "load_scene",
+    "sample",
+    "to_arena",
+]

@@ -60,3 +60,18 @@ def covers(boxes: Boxes, m: int, x: Float[Array, "*S"], y: Float[Array, "*S"]) -
     dx, dy = x - boxes.x[m], y - boxes.y[m]
     along, across = cos * dx + sin * dy, cos * dy - sin * dx
     return boxes.used[m] & (jnp.abs(along) <= boxes.half_x[m]) & (jnp.abs(across) <= boxes.half_y[m])
+
+
+def plan_distance(boxes: Boxes, x: Float[Array, ""], y: Float[Array, ""]) -> Float[Array, "M"]:
+    """Distance [m], in plan, from one point to each box of one arena; 0 inside; used or not."""
+    cos, sin = jnp.cos(boxes.yaw), jnp.sin(boxes.yaw)
+    dx, dy = x - boxes.x, y - boxes.y
+    along = jnp.maximum(jnp.abs(cos * dx + sin * dy) - boxes.half_x, 0.0)
+    across = jnp.maximum(jnp.abs(cos * dy - sin * dx) - boxes.half_y, 0.0)
+    return jnp.hypot(along, across)
+
+
+def footprint_extent(boxes: Boxes) -> tuple[Float[Array, "*B M"], Float[Array, "*B M"]]:
+    """Half sizes [m] along the world's x and y of the rectangle that just holds each box's footprint."""
+    cos, sin = jnp.abs(jnp.cos(boxes.yaw)), jnp.abs(jnp.sin(boxes.yaw))
+    return cos * boxes.half_x + sin * boxes.half_y, sin * boxes.half_x + cos * boxes.half_y

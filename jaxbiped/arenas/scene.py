@@ -1,0 +1,153 @@
+"""Scenes written by hand, in TOML: one arena a file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import jax.numpy as jnp
+import numpy as np
+import pydantic
+
+from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
+from jaxbiped.arenas.families import LANDMARKS_X, MAX_BOXES
+from jaxbiped.config import Model, load
+from jaxbiped.errors import InputError
+from jaxbiped.geometry.boxes import Boxes
+
+Metres = Annotated[float, pydantic.Field(ge=-1000.0, le=1000.0)]
+Positive = Annotated[float, pydantic.Field(gt=0.0, le=1000.0)]
+Angle = Annotated[float, pydantic.Field(ge=-2 * math.pi, le=2 * math.pi)]
+Fraction = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
+Point = tuple[Metres, Metres]
+
+START_CLEARANCE = 0.08  # [m] no box that is higher than a step may be nearer to the start or the goal
+STEP = 0.03  # [m]
+
+
+class BoxConfig(Model):
+    """An upright box."""
+
+    centre: Point
+    """[m] centre in plan."""
+    size: tuple[Positive, Positive]
+    """[m] full sizes along the box's own x and y."""
+    yaw: Angle = 0.0
+    """[rad] anticlockwise from the world's x."""
+    bottom: Annotated[float, pydantic.Field(ge=0.0, le=10.0)] = 0.0
+    """[m] height of the underside; above 0 the box hangs overhead."""
+    top: Annotated[float, pydantic.Field(gt=0.0, le=10.0)]
+    """[m] height of the top."""
+    contrast: Fraction = 1.0
+    """Texture contrast: 0 is plain, and cannot be measured by stereo."""
+
+    @pydantic.model_validator(mode="after")
+    def _upright(self):
+        if self.top <= self.bottom:
+            raise ValueError(f"top must be above bottom ({self.bottom:g} m)")
+        return self
+
+
+class LandmarkConfig(Model):
+    """A landmark, flat on the floor."""
+
+    kind: Literal["circle", "square"]
+    """A disc of 7.5 cm radius or a square of 5 cm (paper, 3.1)."""
+    at: Point
+    """[m] centre."""
+    yaw: Angle = 0.0
+    """[rad]"""
+
+
+class SceneConfig(Model):
+    """One arena."""
+
+    name: Annotated[str, pydantic.Field(min_length=1, max_length=80)]
+    size: tuple[Positive, Positive] = (1.80, 1.40)
+    """[m] the area, from the origin (paper, 3.1)."""
+    start: tuple[Metres, Metres, Angle]
+    """[m, m, rad] where the robot stands at first."""
+    goal: Point
+    """[m] the point to reach within 10 cm."""
+    floor_contrast: Fraction = 1.0
+    boxes: tuple[BoxConfig, ...] = ()
+    landmarks: tuple[LandmarkConfig, ...] = ()
+
+
+def load_scene(path: str | Path) -> tuple[str, Arena]:
+    """Name and arena of a scene file.
+
+    Raises:
+      InputError: what is wrong with the file, first thing first; start, goal or a box outside the area; start or
+        goal inside an obstacle.
+    """
+    scene = load(SceneConfig, path)
+    _check(scene, path)
+    return scene.name, to_arena(scene)
+
+
+def to_arena(scene: SceneConfig) -> Arena:
+    """The arena of a scene, padded to at least the slots of a random arena, so that both share compiled programs."""
+    slots = max(MAX_BOXES, len(scene.boxes))
+    rows = np.zeros((8, slots), np.float32)
+    for m, box in enumerate(scene.boxes):
+        half_x, half_y = box.size[0] / 2, box.size[1] / 2
+        rows[:, m] = (*box.centre, box.yaw, half_x, half_y, box.bottom, box.top, box.contrast)
+    x, y, yaw, half_x, half_y, bottom, top, contrast = map(jnp.asarray, rows)
+    used = jnp.arange(slots) < len(scene.boxes)
+    boxes = Boxes(x, y, yaw, half_x, half_y, bottom, top, bottom > 0, contrast, used)
+    slots = max(len(LANDMARKS_X), len(scene.landmarks))
+    marks = np.zeros((3, slots), np.float32)
+    kind = np.zeros(slots, np.int32)
+    for n, mark in enumerate(scene.landmarks):
+        marks[:, n] = (*mark.at, mark.yaw)
+        kind[n] = CIRCLE if mark.kind == "circle" else SQUARE
+    used = jnp.arange(slots) < len(scene.landmarks)
+    return Arena(
+        size_xy=jnp.array(scene.size, jnp.float32),
+        boxes=boxes,
+        landmarks=Landmarks(*map(jnp.asarray, marks), jnp.asarray(kind), used),
+        start_xyyaw=jnp.array(scene.start, jnp.float32),
+        goal_xy=jnp.array(scene.goal, jnp.float32),
+        floor_contrast=jnp.float32(scene.floor_contrast),
+        family=jnp.int32(-1),
+        difficulty=jnp.float32(0.0),
+    )
+
+
+def _check(scene: SceneConfig, path: str | Path) -> None:
+    size_x, size_y = scene.size
+    for field, (x, y) in (("start", scene.start[:2]), ("goal", scene.goal)):
+        if not (0 < x < size_x and 0 < y < size_y):
+            raise InputError(
+                f"must lie inside the area of {size_x:g} x {size_y:g} m", file=path, field=field, value=[x, y]
+            )
+    for n, mark in enumerate(scene.landmarks):
+        if not (0 <= mark.at[0] <= size_x and 0 <= mark.at[1] <= size_y):
+            raise InputError("must lie inside the area", file=path, field=f"landmarks.{n}.at", value=list(mark.at))
+    for m, box in enumerate(scene.boxes):
+        cos, sin = abs(math.cos(box.yaw)), abs(math.sin(box.yaw))
+        reach_x = (cos * box.size[0] + sin * box.size[1]) / 2
+        reach_y = (sin * box.size[0] + cos * box.size[1]) / 2
+        x, y = box.centre
+        slack = 1e-6  # [m] a box may end exactly at the rim
+        if x - reach_x < -slack or x + reach_x > size_x + slack or y - reach_y < -slack or y + reach_y > size_y + slack:
+            raise InputError(
+                f"the box must lie inside the area of {size_x:g} x {size_y:g} m",
+                file=path,
+                field=f"boxes.{m}",
+                value=list(box.centre),
+            )
+        for field, (px, py) in (("start", scene.start[:2]), ("goal", scene.goal)):
+            dx, dy = px - x, py - y
+            along = math.cos(box.yaw) * dx + math.sin(box.yaw) * dy
+            across = math.cos(box.yaw) * dy - math.sin(box.yaw) * dx
+            near = math.hypot(max(abs(along) - box.size[0] / 2, 0), max(abs(across) - box.size[1] / 2, 0))
+            if near < START_CLEARANCE and box.bottom == 0 and box.top > 2 * STEP:
+                raise InputError(
+                    f"must be at least {START_CLEARANCE:g} m away from boxes.{m}, an obstacle",
+                    file=path,
+                    field=field,
+                    value=[px, py],
+                )
