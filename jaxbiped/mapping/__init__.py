@@ -1,1 +1,24 @@
+"""Points to a classed 2D grid map."""
 
+from jaxbiped.mapping.cobstacles import c_obstacles
+from jaxbiped.mapping.grid import Body, Cell, GridSpec
+from jaxbiped.mapping.gridmap import GridMap, classify, empty, mark_footprint, update
+from jaxbiped.mapping.leveling import level_view
+from jaxbiped.mapping.params import MapConfig, MapParams
+from jaxbiped.mapping.truth import truth_grid
+
+__all__ = [
+    "Body",
+    "Cell",
+    "GridMap",
+    "GridSpec",
+    "MapConfig",
+    "MapParams",
+    "c_obstacles",
+    "classify",
+    "empty",
+    "level_view",
+    "mark_footprint",
+    "truth_grid",
+    "update",
+]

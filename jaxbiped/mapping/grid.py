@@ -30,15 +30,18 @@ class GridSpec:
     index k is level k + `lowest`.
 
     Raises:
-      InputError: the pitch does not divide the area.
+      InputError: the pitch does not divide the area, a column does not fit a 32-bit mask, or there is no room
+        for the ground.
     """
 
     size_x: float = 1.80  # [m]
     size_y: float = 1.40  # [m]
     pitch: float = 0.05  # [m]
     level_height: float = 0.03  # [m]
-    lowest: int = -1  # level of voxel 0
+    lowest: int = -1  # level of voxel 0; levels below 0 are noise of the base floor
     levels: int = 16  # Z, number of voxel levels
+    ground_levels: int = 3  # levels that a robot may stand on: 0 (floor), 1 and 2 (bumps of 3 and 6 cm)
+    max_radius: float = 0.15  # [m] largest radius of a body that this grid is read for
 
     def __post_init__(self):
         for name in ("size_x", "size_y"):
@@ -48,10 +51,26 @@ class GridSpec:
                     f"must divide the area's {name} of {getattr(self, name):g} m", field="pitch", value=self.pitch
                 )
 
+        if not -8 <= self.lowest <= 0:
+            raise InputError("must lie between -8 and 0", field="lowest", value=self.lowest)
+        if not 1 <= self.ground_levels <= 8:
+            raise InputError("must lie between 1 and 8", field="ground_levels", value=self.ground_levels)
+        if not self.ground_levels < self.levels + self.lowest <= 32:
+            raise InputError(
+                "must leave more levels above 0 than ground_levels, and at most 32", field="levels", value=self.levels
+            )
+        if not (self.level_height > 0 and 0 <= self.max_radius <= 64 * self.pitch):
+            raise InputError("needs a positive level_height and a max_radius of at most 64 cells", value=self)
+
     @property
     def shape(self) -> tuple[int, int]:
         """(H, W)."""
         return round(self.size_y / self.pitch), round(self.size_x / self.pitch)
+
+    @property
+    def cell_share(self) -> float:
+        """A cell's area as a share of 5 x 5 cm, the cell that thresholds on numbers of points are stated for."""
+        return (self.pitch / 0.05) ** 2
 
 
 @jax.tree_util.register_dataclass

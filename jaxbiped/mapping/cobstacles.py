@@ -1,0 +1,112 @@
+"""C-obstacles: 3D evidence to the class of each cell (paper, 2.2, Figs. 4 and 5).
+
+One arena, no batch axis. A column of the 3D grid is one 32-bit mask of its occupied levels (bit l = level l), so that
+growing the obstacles by the robot's radius is an OR of shifted masks, and reading a cell a test against bands of bits.
+"""
+
+from __future__ import annotations
+
+import math
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, UInt32
+
+from jaxbiped.mapping.grid import Body, Cell, GridSpec
+from jaxbiped.mapping.params import MapParams
+
+
+def c_obstacles(
+    evidence: Float[Array, "H W Z"], body: Body, params: MapParams, spec: GridSpec
+) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
+    """Classes (int8, `Cell`) and ground levels (int8) of all cells of one arena, from its evidence [pixels].
+
+    A voxel is occupied when it holds `voxel_points` and a share of `voxel_share` of the voxels right above and
+    below it, out of which noise may leak. A column's ground is its supporting surface (`ground_level`). A cell is then,
+    in this order,
+    - obstacle, when something occupied within the body's radius stands more than one step above this cell's own ground
+      and below the squatting head;
+    - gate, when so below the standing head;
+    - bump, when its ground is above level 0;
+    - floor.
+    No cell is unmeasured here: one without points is read as base floor, within the reach of its neighbours. That is
+    `classify`'s to say. Beyond the rim of the grid nothing is occupied.
+    """
+    columns = occupied_levels(evidence, params, spec)
+    return read_cells(columns, ground_level(columns, evidence, spec), body, params.head_margin, spec)
+
+
+def occupied_levels(evidence: Float[Array, "H W Z"], params: MapParams, spec: GridSpec) -> UInt32[Array, "H W"]:
+    """Masks of the occupied levels of each column; a voxel below level 0 counts as the base floor, level 0."""
+    above = jnp.pad(evidence[..., 1:], ((0, 0), (0, 0), (0, 1)))
+    below = jnp.pad(evidence[..., :-1], ((0, 0), (0, 0), (1, 0)))
+    least = jnp.maximum(params.voxel_points * spec.cell_share, params.voxel_share * jnp.maximum(above, below))
+    bits = jnp.uint32(1) << jnp.maximum(jnp.arange(spec.levels) + spec.lowest, 0).astype(jnp.uint32)
+    occupied = jnp.where((evidence > 0) & (evidence >= least), bits, 0)
+    return jax.lax.reduce(occupied, jnp.uint32(0), jax.lax.bitwise_or, (2,))
+
+
+def ground_level(columns: UInt32[Array, "H W"], evidence: Float[Array, "H W Z"], spec: GridSpec) -> Int[Array, "H W"]:
+    """Level [int32] of each column's supporting surface: in its lowest run of occupied levels, the one with most.
+
+    A run that ends above the levels that a robot may stand on is a wall, and a column without points is unknown: both
+    stand on the base floor, level 0. (The top of the run would be a bump in each cell that a bump's edge only grazes.)
+    """
+    lowest = columns & (~columns + 1)
+    run = columns & ~(columns + lowest)
+    best, most = jnp.zeros(columns.shape, jnp.int32), jnp.zeros(columns.shape)
+    for level in range(spec.ground_levels):
+        here = jnp.where((run >> level) & 1 != 0, evidence[..., level - spec.lowest], 0.0)
+        best, most = jnp.where(here > most, level, best), jnp.maximum(here, most)
+    return jnp.where(run >> spec.ground_levels == 0, best, 0)
+
+
+def read_cells(
+    columns: UInt32[Array, "H W"],
+    ground: Int[Array, "H W"],
+    body: Body,
+    head_margin: Float[Array, ""] | float,
+    spec: GridSpec,
+) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
+    """Classes (int8) and levels (int8) from masks of occupied levels and from the ground level of each cell."""
+    near = dilate(columns, body.radius, spec)
+    lower_face = (jnp.arange(32) - 0.5) * spec.level_height
+    above_step = lower_face >= body.step
+    squatting = near & band(above_step & (lower_face + head_margin < body.squatting), ground)
+    standing = near & band(above_step & (lower_face < body.standing), ground)
+    classes = jnp.where(ground > 0, Cell.BUMP, Cell.FLOOR)
+    classes = jnp.where(standing != 0, Cell.GATE, classes)
+    classes = jnp.where(squatting != 0, Cell.OBSTACLE, classes)
+    return classes.astype(jnp.int8), ground.astype(jnp.int8)
+
+
+def band(levels, ground: Int[Array, "H W"]) -> UInt32[Array, "H W"]:
+    """The mask of `levels` (Bool [32]), which are relative to the ground, in absolute levels for each cell."""
+    bits = jnp.sum(jnp.where(levels, jnp.uint32(1) << jnp.arange(32, dtype=jnp.uint32), 0), dtype=jnp.uint32)
+    return bits << ground.astype(jnp.uint32)
+
+
+def dilate(columns: UInt32[Array, "H W"], radius: Float[Array, ""], spec: GridSpec) -> UInt32[Array, "H W"]:
+    """OR of the columns whose square comes nearer than `radius` [m] to a cell's centre, its own always included.
+
+    `radius` is traced, so all offsets up to `spec.max_radius` are visited; a larger radius is cut to that.
+    """
+    reach = max(math.ceil(spec.max_radius / spec.pitch + 0.5) - 1, 0)
+    gap = jnp.maximum(jnp.arange(reach + 1) - 0.5, 0.0) * spec.pitch
+    within = gap[:, None] ** 2 + gap[None, :] ** 2 < radius**2
+    keep = jnp.where(within, jnp.uint32(0xFFFFFFFF), jnp.uint32(0)).at[0, 0].set(0xFFFFFFFF)
+    # By symmetry one quarter of the offsets decides: grow each row by every half width that some row distance needs,
+    # then OR the rows above and below.
+    height, width = columns.shape
+    padded = jnp.pad(columns, ((0, 0), (reach, reach)))
+    aside = [
+        padded[:, reach + k : reach + k + width] | padded[:, reach - k : reach - k + width] for k in range(reach + 1)
+    ]
+    grown = jnp.zeros_like(columns)
+    for rows in range(reach + 1):
+        line = jnp.zeros_like(columns)
+        for k in range(reach + 1):
+            line = line | (aside[k] & keep[rows, k])
+        line = jnp.pad(line, ((reach, reach), (0, 0)))
+        grown = grown | line[reach + rows : reach + rows + height] | line[reach - rows : reach - rows + height]
+    return grown

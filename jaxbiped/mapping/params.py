@@ -1,0 +1,62 @@
+"""The numbers by which points become classes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+from pydantic import Field
+
+from jaxbiped.config import Model
+
+
+class MapConfig(Model):
+    """Thresholds of the map, with the values found necessary on rendered stereo pairs.
+
+    A number of points is one of pixels of a 512 x 384 image that fall on a cell of 5 x 5 cm; on another pitch it
+    scales with the cell's area.
+    """
+
+    max_range: float = Field(2.0, gt=0)
+    """[m] points further off, in plan, are dropped: their depth is uncertain by centimetres"""
+    voxel_points: float = Field(2.0, ge=0)
+    """a voxel with fewer points is empty, in one view and in the fused evidence"""
+    voxel_share: float = Field(0.05, ge=0, lt=1)
+    """a voxel with a smaller share of the points of one right above or below is empty: noise leaked out of that one"""
+    view_points: float = Field(5.0, ge=0)
+    """a cell with fewer points in one view gets no vote from it"""
+    fused_points: float = Field(10.0, gt=0)
+    """a cell with fewer votes from all views is unmeasured"""
+    head_margin: float = Field(0.0, ge=0)
+    """[m] how far a voxel may reach below the squatting head before it blocks"""
+    refit_slope: float = Field(0.06, ge=0)
+    """greatest slope of the fitted floor plane (3.4 degrees); a steeper one is no floor, and the view stays as it is"""
+    refit_offset: float = Field(0.03, ge=0)
+    """[m] greatest height of the fitted floor plane at the robot"""
+    refit_inlier: float = Field(0.008, gt=0)
+    """[m] a point this near to a level of the fitted floor lies on it"""
+    refit_points: float = Field(400.0, ge=0)
+    """pixels that must lie on the fitted floor; fewer, and the view stays as it is"""
+
+    def params(self) -> MapParams:
+        """These thresholds as traced numbers."""
+        return MapParams(**{name: jnp.float32(value) for name, value in self.model_dump().items()})
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class MapParams:
+    """`MapConfig` as numbers that a sweep may change without compiling anew. Meaning and units as there."""
+
+    max_range: Float[Array, ""]
+    voxel_points: Float[Array, ""]
+    voxel_share: Float[Array, ""]
+    view_points: Float[Array, ""]
+    fused_points: Float[Array, ""]
+    head_margin: Float[Array, ""]
+    refit_slope: Float[Array, ""]
+    refit_offset: Float[Array, ""]
+    refit_inlier: Float[Array, ""]
+    refit_points: Float[Array, ""]
