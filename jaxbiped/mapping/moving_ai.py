@@ -1,0 +1,168 @@
+"""Moving AI benchmark maps (`.map`) and their scenarios (`.scen`).
+
+Format: Sturtevant, "Benchmarks for Grid-Based Pathfinding", IEEE T-CIAIG 4(2), 2012. A position is (x, y) =
+(column, row), with (0, 0) the upper left character. Row i of the class grid is text row i, and column j its column:
+nothing is flipped, so that cell (i, j) = (y, x); the grid's y axis therefore points down the page, and pictures
+of such a map turn it over.
+
+Deviation: water (`W`) is passable in the format, but only from water. A robot that walks has no business there:
+it is an obstacle. Every other character is read as the format says.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float64, Int
+
+from jaxbiped.errors import InputError
+from jaxbiped.files import reason
+from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.mapping.grid import Cell
+
+TERRAIN = {
+    ".": Cell.FLOOR,  # passable
+    "G": Cell.FLOOR,  # passable
+    "S": Cell.FLOOR,  # swamp, passable from ground and at the same cost
+    "@": Cell.OBSTACLE,  # out of bounds
+    "O": Cell.OBSTACLE,  # out of bounds
+    "T": Cell.OBSTACLE,  # trees
+    "W": Cell.OBSTACLE,  # water
+}
+LARGEST_SIDE = 1 << 16  # [cells]; a header beyond this is damage, not a map
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """`Q` queries on one map. Lengths are octile: 1 straight, sqrt(2) oblique, corners never cut."""
+
+    bucket: Int[np.ndarray, "Q"]
+    start_ij: Int[np.ndarray, "Q 2"]  # row, column: the file's y, x
+    goal_ij: Int[np.ndarray, "Q 2"]
+    optimal: Float64[np.ndarray, "Q"]  # [cells]
+    tolerance: Float64[np.ndarray, "Q"]  # [cells] how far `optimal` may be from the exact length, by its digits
+
+
+def load_map(path: str | Path, pitch: float = 1.0) -> ClassGrid:
+    """Read a `.map` of type octile as floor and obstacles, all on level 0.
+
+    Args:
+      path: the file.
+      pitch: [m] side of a cell, above 0; the file does not say.
+
+    Raises:
+      InputError: no such file, another type, a bad header, a row or column missing or in excess, an unknown
+        character, a pitch that is not above 0.
+    """
+    lines = read_lines(path)
+    head = dict(line.split(maxsplit=1) for line in lines[:3] if len(line.split(maxsplit=1)) == 2)
+    if head.get("type") != "octile":
+        raise InputError(
+            "must be a Moving AI map, whose first line is 'type octile'", file=path, value=(lines or [""])[0]
+        )
+    height, width = (side(head.get(key), path, key) for key in ("height", "width"))
+    if len(lines) < 4 or lines[3] != "map":
+        raise InputError("must be the word 'map'", file=path, field="line 4", value=lines[3] if len(lines) > 3 else "")
+    rows = lines[4:]
+    if len(rows) != height:
+        raise InputError(f"must hold {height} rows, as its header says", file=path, field="map", value=len(rows))
+    for i, row in enumerate(rows):
+        if len(row) != width:
+            message = f"must be {width} characters long, as the header says"
+            raise InputError(message, file=path, field=f"line {i + 5}", value=len(row))
+    cell_of = np.full(256, -1, np.int8)
+    for character, cell in TERRAIN.items():
+        cell_of[ord(character)] = cell
+    characters = np.frombuffer("".join(rows).encode("latin-1"), np.uint8).reshape(height, width)
+    classes = cell_of[characters]
+    wrong = np.argwhere(classes < 0)
+    if len(wrong):
+        i, j = wrong[0]
+        field = f"line {i + 5}, column {j + 1}"
+        raise InputError(f"must be one of {' '.join(TERRAIN)}", file=path, field=field, value=rows[i][j])
+    return ClassGrid(classes, np.zeros_like(classes), np.zeros(2), float(pitch))
+
+
+def load_scenario(path: str | Path, grid: ClassGrid) -> Scenario:
+    """Read a `.scen` file of version 1 that belongs to the map `grid`.
+
+    Raises:
+      InputError: no such file, another version, a line that is cut short or no query, a map of another size, a
+        position outside the map, a negative or infinite length, no query at all.
+    """
+    lines = read_lines(path)
+    words = lines[0].split() if lines else []
+    if len(words) != 2 or words[0] != "version" or words[1] not in ("1", "1.0"):
+        raise InputError("must begin with 'version 1'", file=path, field="line 1", value=lines[0] if lines else "")
+    numbered = [(number, line) for number, line in enumerate(lines[1:], start=2) if line.strip()]
+    if not numbered:
+        raise InputError("must hold at least one query", file=path)
+    queries = [query(line, grid.shape, path, f"line {number}") for number, line in numbered]
+    bucket, start_ij, goal_ij, optimal, texts = zip(*queries, strict=True)
+    return Scenario(
+        np.array(bucket), np.array(start_ij), np.array(goal_ij), np.array(optimal), rounding(np.array(optimal), texts)
+    )
+
+
+def query(
+    line: str, shape: tuple[int, int], path: str | Path, field: str
+) -> tuple[int, tuple[int, int], tuple[int, int], float, str]:
+    """One line of a scenario: bucket, start (i, j), goal (i, j), length, and the length as written."""
+    words = line.split("\t") if "\t" in line else line.split()
+    allowed = "must hold bucket, map, width, height, start x, start y, goal x, goal y, optimal length"
+    try:
+        bucket, _, width, height, start_x, start_y, goal_x, goal_y, text = words
+        bucket, width, height, start_x, start_y, goal_x, goal_y = map(
+            int, (bucket, width, height, start_x, start_y, goal_x, goal_y)
+        )
+        length = float(text)
+    except ValueError:
+        raise InputError(allowed, file=path, field=field, value=line) from None
+    if (height, width) != shape:
+        message = f"must be of a map as wide and high as this one, {shape[1]} x {shape[0]}"
+        raise InputError(message, file=path, field=field, value=f"{width} x {height}")
+    for x, y in ((start_x, start_y), (goal_x, goal_y)):
+        if not (0 <= x < width and 0 <= y < height):
+            raise InputError(f"position must lie on the map, {width} x {height}", file=path, field=field, value=(x, y))
+    if not 0 <= length < math.inf:
+        raise InputError("optimal length must be finite and 0 or more", file=path, field=field, value=length)
+    return bucket, (start_y, start_x), (goal_y, goal_x), length, text.strip()
+
+
+def rounding(lengths: Float64[np.ndarray, "Q"], texts: tuple[str, ...]) -> Float64[np.ndarray, "Q"]:
+    """How far each length may be from the exact one, by the digits that its file was written with.
+
+    The public files were printed in three ways, which a file shows as a whole and a single number does not ("4" may
+    be any of them): 2 decimals, 6 significant digits with trailing zeros dropped, and 8 decimals. So a length may be
+    off by half a unit of the file's last decimal or of its last significant digit (the sixth at least), whichever is
+    greater, and by the rounding of sums.
+    """
+    decimals = max(len(text.partition(".")[2]) for text in texts)
+    significant = max(6, *(len(text.replace(".", "").lstrip("0")) for text in texts))
+    exponent = np.floor(np.log10(np.maximum(lengths, 1.0)))
+    unit = np.maximum(10.0**-decimals if decimals else 0.0, 10.0 ** (exponent + 1 - significant))
+    return 0.5 * unit + 1e-9 * lengths
+
+
+def side(text: str | None, path: str | Path, field: str) -> int:
+    """A height or a width of the header."""
+    if text is None or not text.isascii() or not text.isdigit() or not 1 <= int(text) <= LARGEST_SIDE:
+        message = f"must be a whole number of cells from 1 to {LARGEST_SIDE}"
+        raise InputError(message, file=path, field=field, value=text or "")
+    return int(text)
+
+
+def read_lines(path: str | Path) -> list[str]:
+    """The lines of a text file, without their ends and without empty lines at the end of the file."""
+    try:
+        lines = Path(path).read_bytes().decode("latin-1").splitlines()
+    except FileNotFoundError:
+        raise InputError("no such file", file=path) from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {reason(error)}", file=path) from None
+    while lines and not lines[-1].strip():
+        lines.pop()
+    return lines
