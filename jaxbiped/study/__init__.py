@@ -1,1 +1,67 @@
+"""Paired statistics of strategies, and the store of their results."""
 
+from jaxbiped.study.atomic import write_atomically
+from jaxbiped.study.comparison import (
+    ALL,
+    QUESTION,
+    Comparison,
+    PairComparison,
+    StrategySummary,
+    Stratum,
+    compare,
+    default_pairs,
+)
+from jaxbiped.study.intervals import Estimate, mean_and_median, paired_difference, proportion
+from jaxbiped.study.paired import (
+    PairedMetric,
+    equivalent_mean,
+    equivalent_success,
+    holm,
+    improvement,
+    mcnemar,
+    metric_difference,
+    signed_rank,
+    success_difference,
+)
+from jaxbiped.study.power import connor_sample_size, mcnemar_power, sample_size
+from jaxbiped.study.schema import CODES, FAMILIES, SCHEMA, STRATEGIES, validate
+from jaxbiped.study.store import Manifest, Store, create, read, read_manifest, scan
+
+__all__ = [
+    "ALL",
+    "CODES",
+    "FAMILIES",
+    "QUESTION",
+    "SCHEMA",
+    "STRATEGIES",
+    "Comparison",
+    "Estimate",
+    "Manifest",
+    "PairComparison",
+    "PairedMetric",
+    "Store",
+    "StrategySummary",
+    "Stratum",
+    "compare",
+    "connor_sample_size",
+    "create",
+    "default_pairs",
+    "equivalent_mean",
+    "equivalent_success",
+    "holm",
+    "improvement",
+    "mcnemar",
+    "mcnemar_power",
+    "mean_and_median",
+    "metric_difference",
+    "paired_difference",
+    "proportion",
+    "read",
+    "read_manifest",
+    "sample_size",
+    "scan",
+    "signed_rank",
+    "success_difference",
+    "validate",
+    "write_atomically",
+]

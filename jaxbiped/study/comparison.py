@@ -1,0 +1,217 @@
+"""Strategies against each other on the same arenas, overall and in strata."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import polars as pl
+
+from jaxbiped.errors import InputError
+from jaxbiped.study.intervals import NOTHING, Estimate, proportion
+from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
+from jaxbiped.study.schema import CODES, FAMILIES, SCENE, STRATEGIES, validate
+
+QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about
+
+
+@dataclass(frozen=True)
+class Stratum:
+    """A set of arenas: all of them, one family, or one third of the difficulties."""
+
+    kind: str  # "all", "family" or "difficulty"
+    name: str
+
+
+ALL = Stratum("all", "all arenas")
+
+
+@dataclass(frozen=True)
+class StrategySummary:
+    """One strategy on one stratum."""
+
+    stratum: Stratum
+    strategy: str
+    n: int  # arenas
+    success: Estimate
+    reachable: Estimate  # share of arenas with an oracle plan for this strategy
+    success_of_reachable: Estimate  # success on those: what is missing is sensing's and walking's, not planning's
+    codes: tuple[int, ...]  # missions by how they ended, in the order of CODES
+    distance: Estimate  # [m] mean over its own reached missions: other arenas than another strategy's
+    time: Estimate  # [s] the same
+
+
+@dataclass(frozen=True)
+class PairComparison:
+    """Two strategies on the arenas of one stratum that both have a row for. Differences are first minus second."""
+
+    stratum: Stratum
+    first: str
+    second: str
+    success: Estimate  # difference of the success rates
+    first_only: int  # arenas that only the first solved
+    second_only: int
+    distance: PairedMetric  # [m]
+    time: PairedMetric  # [s]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Everything that a report says about one sweep point."""
+
+    point: int
+    level: float  # of every interval
+    seed: int  # of the bootstraps
+    resamples: int
+    strategies: tuple[str, ...]
+    summaries: tuple[StrategySummary, ...]
+    pairs: tuple[PairComparison, ...]
+
+    def strata(self, kind: str) -> tuple[Stratum, ...]:
+        """The strata of one kind, in order."""
+        return tuple(dict.fromkeys(item.stratum for item in self.summaries if item.stratum.kind == kind))
+
+    def pair(self, first: str, second: str, stratum: Stratum = ALL) -> PairComparison | None:
+        """One pair on one stratum; None where it was not compared."""
+        wanted = (stratum, first, second)
+        return next((pair for pair in self.pairs if (pair.stratum, pair.first, pair.second) == wanted), None)
+
+    def summary(self, strategy: str, stratum: Stratum = ALL) -> StrategySummary | None:
+        """One strategy on one stratum; None where it has no arenas."""
+        return next((item for item in self.summaries if (item.stratum, item.strategy) == (stratum, strategy)), None)
+
+
+def default_pairs(strategies: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """The project's question first, then the first strategy against each other one."""
+    baseline = [(strategies[0], other) for other in strategies[1:]]
+    question = [QUESTION] if set(QUESTION) <= set(strategies) else []
+    return tuple(dict.fromkeys(question + baseline))
+
+
+def compare(
+    frame: pl.DataFrame,
+    *,
+    point: int = 0,
+    pairs: Sequence[tuple[str, str]] | None = None,
+    seed: int = 0,
+    resamples: int = 4999,
+    level: float = 0.95,
+) -> Comparison:
+    """Compare the strategies of one sweep point.
+
+    Holm's correction runs over all p-values of a table: success, distance and time of all pairs, over all arenas, over
+    all families together, and over all difficulties together.
+
+    Args:
+      frame: rows of `schema.SCHEMA`.
+      pairs: (first, second) to compare; by default `default_pairs`.
+      seed: of the bootstraps; each one gets its own stream from it.
+    """
+    frame = validate(frame).filter(pl.col("point") == point)
+    if frame.is_empty():
+        raise InputError("no row of this sweep point", field="point", value=point)
+    present = set(frame["strategy"])
+    strategies = tuple(name for name in STRATEGIES if name in present)
+    pairs = default_pairs(strategies) if pairs is None else tuple(pairs)
+    for name in {name for pair in pairs for name in pair} - present:
+        raise InputError(f"must be one of {', '.join(strategies)}", field="pairs", value=name)
+    rng = np.random.default_rng(seed)
+    summaries, compared = [], []
+    for stratum, rows in strata(frame):
+        by_name = {name: rows.filter(pl.col("strategy") == name) for name in strategies}
+        summaries += [summarise(stratum, name, by_name[name], level) for name in strategies]
+        for first, second in pairs:
+            options = {"seed": int(rng.integers(2**32)), "resamples": resamples, "level": level}
+            compared.append(compare_pair(stratum, (first, by_name[first]), (second, by_name[second]), **options))
+    return Comparison(point, level, seed, resamples, strategies, tuple(summaries), corrected(compared))
+
+
+def strata(frame: pl.DataFrame) -> Iterator[tuple[Stratum, pl.DataFrame]]:
+    """All rows, then those of each family, then those of each third of the arenas by difficulty."""
+    yield ALL, frame
+    for family in (*FAMILIES, SCENE):
+        rows = frame.filter(pl.col("family") == family)
+        if len(rows):
+            yield Stratum("family", family), rows
+    difficulty = pl.col("difficulty")
+    values = frame.unique("arena")["difficulty"].to_numpy()
+    # Arenas that are equally difficult stay together, so thirds can be unequal, or fewer than three.
+    edges = np.unique(np.quantile(values, [1 / 3, 2 / 3], method="lower"))
+    bounds = [-np.inf, *edges, np.inf]
+    for low, high in itertools.pairwise(bounds):
+        rows = frame.filter((difficulty > low) & (difficulty <= high))
+        if len(rows):
+            yield Stratum("difficulty", f"{rows['difficulty'].min():.2f} to {rows['difficulty'].max():.2f}"), rows
+
+
+def summarise(stratum: Stratum, strategy: str, rows: pl.DataFrame, level: float) -> StrategySummary:
+    """One strategy's rows of one stratum."""
+    reached = rows.filter("success")
+    reachable = rows.filter("reachable")
+    counts = dict(rows["code"].value_counts().iter_rows())
+    means = {
+        name: Estimate(float(reached[name].mean()), n=len(reached)) if len(reached) else NOTHING
+        for name in ("distance", "time")
+    }
+    return StrategySummary(
+        stratum=stratum,
+        strategy=strategy,
+        n=len(rows),
+        success=proportion(len(reached), len(rows), level),
+        reachable=proportion(len(reachable), len(rows), level),
+        success_of_reachable=proportion(int(reachable["success"].sum()), len(reachable), level),
+        codes=tuple(counts.get(code, 0) for code in CODES),
+        **means,
+    )
+
+
+def compare_pair(
+    stratum: Stratum,
+    first: tuple[str, pl.DataFrame],
+    second: tuple[str, pl.DataFrame],
+    *,
+    seed: int,
+    resamples: int,
+    level: float,
+) -> PairComparison:
+    """Two strategies (name, rows) on the arenas that both have, in the order of the arenas."""
+    columns = ["arena", "success", "distance", "time"]
+    sides = [rows.select(columns) for _, rows in (first, second)]
+    both = sides[0].join(sides[1], on="arena", suffix="_second").sort("arena")
+    solved = both.filter(pl.col("success") & pl.col("success_second"))
+    a, b = both["success"].to_numpy(), both["success_second"].to_numpy()
+    metrics = {
+        name: metric_difference(
+            solved[name].to_numpy(), solved[f"{name}_second"].to_numpy(), seed=seed, resamples=resamples, level=level
+        )
+        for name in ("distance", "time")
+    }
+    return PairComparison(
+        stratum=stratum,
+        first=first[0],
+        second=second[0],
+        success=success_difference(a, b, level),
+        first_only=int(np.sum(a & ~b)),
+        second_only=int(np.sum(b & ~a)),
+        **metrics,
+    )
+
+
+def corrected(pairs: Sequence[PairComparison]) -> tuple[PairComparison, ...]:
+    """The pairs with Holm's p-values, one correction for each kind of stratum."""
+    result = {}
+    for kind in ("all", "family", "difficulty"):
+        table = [index for index, pair in enumerate(pairs) if pair.stratum.kind == kind]
+        tests = [(pairs[i].success.p, pairs[i].distance.p, pairs[i].time.p) for i in table]
+        adjusted = iter(holm([p for row in tests for p in row]))
+        for index in table:
+            pair, (success, distance, time) = pairs[index], (next(adjusted), next(adjusted), next(adjusted))
+            result[index] = replace(
+                pair,
+                success=replace(pair.success, p_holm=success),
+                distance=replace(pair.distance, p_holm=distance),
+                time=replace(pair.time, p_holm=time),
+            )
+    return tuple(result[index] for index in range(len(pairs)))

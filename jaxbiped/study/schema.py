@@ -1,0 +1,91 @@
+"""The row of a study: one for each sweep point, arena and strategy."""
+
+from __future__ import annotations
+
+import polars as pl
+
+from jaxbiped.errors import InputError
+
+REACHED = "reached"
+CODES = (REACHED, "no_path", "stuck", "collided", "fell", "out_of_bounds", "out_of_steps", "invalid")
+STRATEGIES = ("full", "bump_aware", "gate_aware", "floor_only", "blind_stop")  # the order of every table and figure
+FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")
+SCENE = "scene"  # the family of an arena that was written by hand
+KEY = ("point", "arena", "strategy")
+
+SCHEMA = pl.Schema(
+    {
+        "point": pl.Int32,  # sweep point, 0 in a comparison
+        "arena": pl.Int64,  # k of fold_in(key(seed), k): what pairs the strategies
+        "family": pl.String,  # one of FAMILIES, or SCENE
+        "difficulty": pl.Float32,  # 0 (easy) to 1 (hard)
+        "strategy": pl.String,  # one of STRATEGIES
+        "code": pl.String,  # one of CODES: how the mission ended
+        "success": pl.Boolean,  # code == REACHED
+        "distance": pl.Float64,  # [m] walked; null unless reached
+        "time": pl.Float64,  # [s] taken; null unless reached
+        "walked": pl.Float64,  # [m] walked, however the mission ended
+        "elapsed": pl.Float64,  # [s] taken, however the mission ended
+        "measurements": pl.Int32,
+        "decisions": pl.Int32,
+        "goal_distance": pl.Float64,  # [m] from the goal at the end
+        "reachable": pl.Boolean,  # a plan exists for this strategy with perfect knowledge (the oracle plan)
+        "oracle_cost": pl.Float64,  # that plan's cost; null where there is none
+        "oracle_length": pl.Float64,  # [m] that plan's length; null where there is none
+    }
+)
+NULLABLE = ("distance", "time", "oracle_cost", "oracle_length")
+
+
+def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
+    """The frame with its columns in the schema's order; `InputError` about the first thing wrong with it.
+
+    Checked: columns and types, the named values, nulls (a number that is not valid is null, never NaN), that
+    distance and time are there exactly for those that reached, and that no row comes twice. NaN is allowed only in
+    `walked`, `elapsed` and `goal_distance` of a mission that ended as `invalid`.
+    """
+    where = {"file": str(file)} if file is not None else {}
+    for name, dtype in SCHEMA.items():
+        if name not in frame.columns:
+            raise InputError(f"column missing; rows have {', '.join(SCHEMA)}", field=name, **where)
+        if frame.schema[name] != dtype:
+            raise InputError(f"must be of type {dtype}", field=name, value=str(frame.schema[name]), **where)
+    for name in frame.columns:
+        if name not in SCHEMA:
+            raise InputError(f"unknown column; rows have {', '.join(SCHEMA)}", field=name, **where)
+    for name, (wrong, allowed) in rules().items():
+        bad = frame.filter(wrong)
+        if len(bad):
+            row = bad.row(0, named=True)
+            at = f" (point {row['point']}, arena {row['arena']}, strategy {row['strategy']})"
+            raise InputError(allowed + at, field=name, value=row[name], **where)
+    doubled = frame.filter(pl.struct(KEY).is_duplicated())
+    if len(doubled):
+        raise InputError("each sweep point, arena and strategy has one row", value=doubled.select(KEY).row(0), **where)
+    return frame.select(SCHEMA.names())
+
+
+def rules() -> dict[str, tuple[pl.Expr, str]]:
+    """For each column: what is wrong in it, as a Boolean expression over rows, and what is allowed."""
+    reached, invalid = pl.col("code") == REACHED, pl.col("code") == "invalid"
+    checks = {
+        "code": (~pl.col("code").is_in(CODES), f"must be one of {', '.join(CODES)}"),
+        "strategy": (~pl.col("strategy").is_in(STRATEGIES), f"must be one of {', '.join(STRATEGIES)}"),
+        "family": (~pl.col("family").is_in([*FAMILIES, SCENE]), f"must be one of {', '.join([*FAMILIES, SCENE])}"),
+        "success": (pl.col("success") != reached, "must be true exactly where the code is reached"),
+    }
+    for name in ("distance", "time"):
+        wrong = (pl.col(name).is_not_null() != reached) | ~pl.col(name).is_finite() | (pl.col(name) < 0)
+        checks[name] = (wrong, "must be finite and not negative where the code is reached, null elsewhere")
+    for name in ("walked", "elapsed", "goal_distance"):
+        wrong = ~invalid & (~pl.col(name).is_finite() | (pl.col(name) < 0))
+        checks[name] = (wrong, "must be finite and not negative unless the code is invalid")
+    for name in ("oracle_cost", "oracle_length"):
+        wrong = pl.col(name).is_not_null() & (~pl.col("reachable") | ~pl.col(name).is_finite())
+        checks[name] = (wrong, "must be finite or null, and null where the goal is not reachable")
+    checks["difficulty"] = (~pl.col("difficulty").is_finite(), "must be finite")
+    named = {name: checks.get(name, (pl.lit(False), "")) for name in SCHEMA}
+    return {
+        name: (wrong if name in NULLABLE else pl.col(name).is_null() | wrong, allowed or "must not be null")
+        for name, (wrong, allowed) in named.items()
+    }

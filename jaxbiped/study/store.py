@@ -1,0 +1,288 @@
+"""A results folder: rows as Parquet shards and a JSON manifest that says what they are.
+
+    <folder>/manifest.json          written first, so that what is there can always be named
+    <folder>/rows/part-00000.parquet  the rows of one block of arenas, or of another unit that the writer numbers
+
+Every file is whole or not there; a shard that is there is done. A study that was stopped is therefore its manifest and
+some of its shards, and the numbers of those that are missing say what is left to do.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import platform
+import shlex
+import sys
+import time
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Literal
+
+import jax
+import polars as pl
+import pydantic
+
+from jaxbiped import __version__
+from jaxbiped.config import Model, config_hash, parse
+from jaxbiped.errors import InputError
+from jaxbiped.study.atomic import cannot_write, write_atomically
+from jaxbiped.study.lock import LOCK, FolderLock
+from jaxbiped.study.schema import SCHEMA, STRATEGIES, validate
+
+FORMAT = 1
+MANIFEST, ROWS = "manifest.json", "rows"
+UNREADABLE = (pl.exceptions.PolarsError, OSError, pydantic.ValidationError, ValueError)
+
+
+class Manifest(Model):
+    """What a results folder holds and how it came to be."""
+
+    format: int = FORMAT
+    state: Literal["running", "stopped", "finished"]
+    command: str
+    """The command line that wrote the folder."""
+    config: dict[str, Any]
+    """The resolved configuration."""
+    config_hash: str
+    versions: dict[str, str]
+    device: str
+    seed: int
+    arenas: int
+    """Arenas that the study is to have for each sweep point."""
+    started: str
+    """ISO 8601, UTC."""
+    wall_time: float | None = None
+    """Seconds from start to finish, compilation included."""
+    compile_time: float | None = None
+    """Seconds of compilation."""
+    shards: int | None = None
+    rows: int | None = None
+    """Rows in all shards, once finished."""
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that results may depend on."""
+    packages = {name: metadata.version(name) for name in ("jax", "jaxlib", "numpy", "mujoco")}
+    return {"jaxbiped": __version__, **packages, "python": platform.python_version()}
+
+
+def device() -> str:
+    """The devices of this process in words, such as "2 x cpu"."""
+    devices = jax.devices()
+    return f"{len(devices)} x {devices[0].device_kind}"
+
+
+class Store:
+    """A results folder open for writing. Made by `create`; a context manager that finishes nothing by itself.
+
+    On leaving by an exception, or without `finish`, the manifest says "stopped"; a folder with no shard yet is removed.
+    """
+
+    def __init__(self, folder: Path, manifest: Manifest, lock: FolderLock, made: bool):
+        self.folder, self.manifest, self.lock, self.made = folder, manifest, lock, made
+        self.started = time.monotonic()
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def append(self, frame: pl.DataFrame, shard: int | None = None) -> Path:
+        """Write rows as one shard, `rows/part-<shard>.parquet`; by default the next number.
+
+        Raises `InputError` when the rows do not fit the schema, the shard is there already, or the disk is full.
+        """
+        done = self.done()
+        shard = max(done, default=-1) + 1 if shard is None else shard
+        path = shard_path(self.folder, shard)
+        if shard in done:
+            raise InputError("this shard is written already", file=path)
+        buffer = io.BytesIO()
+        validate(frame).write_parquet(buffer)
+        write_atomically(path, buffer.getvalue())
+        return path
+
+    def done(self) -> set[int]:
+        """Numbers of the shards that are written."""
+        return {shard_number(path) for path in shard_paths(self.folder)}
+
+    def finish(self, *, compile_time: float | None = None, wall_time: float | None = None) -> Manifest:
+        """Write the final manifest and let go of the folder. `wall_time` defaults to the time since `create`."""
+        rows = int(scan(self.folder).select(pl.len()).collect().item())
+        wall_time = time.monotonic() - self.started if wall_time is None else wall_time
+        update = {"wall_time": wall_time, "compile_time": compile_time, "shards": len(self.done()), "rows": rows}
+        self.write_manifest(state="finished", **update)
+        self.close()
+        return self.manifest
+
+    def write_manifest(self, **changes: Any) -> None:
+        """Replace the manifest with a changed one."""
+        self.manifest = self.manifest.model_copy(update=changes)
+        write_atomically(self.folder / MANIFEST, (self.manifest.model_dump_json(indent=2) + "\n").encode())
+
+    def close(self) -> None:
+        """Let go of the folder; say "stopped" if it is not finished, remove it if nothing was written."""
+        if self.lock.descriptor < 0:
+            return
+        try:
+            if self.manifest.state == "running":
+                if self.done():
+                    self.write_manifest(state="stopped")
+                else:
+                    (self.folder / MANIFEST).unlink(missing_ok=True)
+                    remove_if_empty(self.folder / ROWS)
+        except (InputError, OSError):
+            pass  # a full disk: "running" without a lock reads as stopped
+        finally:
+            self.lock.release()
+            if self.made:
+                remove_if_empty(self.folder)
+
+
+def create(
+    folder: str | Path, config: Model, *, seed: int, arenas: int, command: str | None = None, device_name: str = ""
+) -> Store:
+    """Start a results folder: take its lock, write its manifest.
+
+    Args:
+      folder: must not exist, or be empty.
+      config: the resolved configuration; its values and its hash are stored.
+      command: the command line; by default this process's.
+      device_name: by default the devices that JAX sees.
+    """
+    folder = Path(folder)
+    refuse_filled(folder)
+    manifest = Manifest(
+        state="running",
+        command=command if command is not None else shlex.join(["jaxbiped", *sys.argv[1:]]),
+        config=config.model_dump(mode="json"),
+        config_hash=config_hash(config),
+        versions=versions(),
+        device=device_name or device(),
+        seed=seed,
+        arenas=arenas,
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+    made = not folder.exists()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = FolderLock(folder)
+    except (OSError, InputError) as error:
+        if made:
+            remove_if_empty(folder)
+        raise cannot_write(folder, error) if isinstance(error, OSError) else error from None
+    try:
+        refuse_filled(folder)  # another process may have come and gone before we had the lock
+    except InputError:
+        lock.release()
+        raise
+    store = Store(folder, manifest, lock, made)
+    try:
+        (folder / ROWS).mkdir()
+        store.write_manifest()
+    except (OSError, InputError) as error:
+        store.close()
+        raise cannot_write(folder, error) if isinstance(error, OSError) else error from None
+    return store
+
+
+def remove_if_empty(folder: Path) -> None:
+    """Remove a folder that holds nothing."""
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+def refuse_filled(folder: Path) -> None:
+    """Raise `InputError` unless the folder is new or empty."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError("is a file; a results folder must be new or empty", file=folder)
+    if folder.is_dir() and any(path.name != LOCK for path in folder.iterdir()):
+        raise InputError("exists and is not empty; a results folder must be new or empty", file=folder)
+
+
+def read(folder: str | Path) -> tuple[pl.DataFrame, Manifest]:
+    """All rows, sorted by sweep point, arena and strategy, and the manifest.
+
+    Raises `InputError` about what is missing or broken, by name. A folder whose study is not finished reads as the
+    rows that it has; `Manifest.state` tells.
+    """
+    manifest = read_manifest(folder)
+    frames = []
+    for path in shard_paths(folder):
+        try:
+            frames.append(validate(pl.read_parquet(path), file=path))
+        except InputError:
+            raise
+        except UNREADABLE as error:
+            raise broken_shard(path, error) from None
+    check_complete(folder, manifest, sum(len(frame) for frame in frames))
+    frame = pl.concat(frames) if frames else pl.DataFrame(schema=SCHEMA)
+    return validate(frame, file=folder).sort("point", "arena", pl.col("strategy").cast(pl.Enum(STRATEGIES))), manifest
+
+
+def scan(folder: str | Path) -> pl.LazyFrame:
+    """All rows as a lazy frame, in the order of the shards: for studies that do not fit in memory.
+
+    Only the shards' footers are read and checked here.
+    """
+    paths = shard_paths(folder)
+    for path in paths:
+        try:
+            schema = pl.read_parquet_schema(path)
+        except UNREADABLE as error:
+            raise broken_shard(path, error) from None
+        if dict(schema) != dict(SCHEMA):
+            raise InputError(f"is not a shard of this format; its columns must be {', '.join(SCHEMA)}", file=path)
+    return pl.scan_parquet(paths) if paths else pl.LazyFrame(schema=SCHEMA)
+
+
+def read_manifest(folder: str | Path) -> Manifest:
+    """The manifest of a results folder; `InputError` when there is none, or none that this version reads."""
+    path = Path(folder) / MANIFEST
+    if not Path(folder).is_dir():
+        raise InputError("no such results folder", file=folder)
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"is not a results folder; it has no {MANIFEST}", file=folder) from None
+    except UNREADABLE as error:
+        raise InputError(f"is not valid JSON: {error}", file=path) from None
+    found = data.get("format") if isinstance(data, dict) else None
+    if found != FORMAT:
+        raise InputError(f"this version reads manifests of format {FORMAT}", file=path, field="format", value=found)
+    return parse(Manifest, data, file=path)
+
+
+def check_complete(folder: str | Path, manifest: Manifest, rows: int) -> None:
+    """Raise `InputError` when a finished study has lost rows."""
+    if manifest.state != "finished":
+        return
+    shards = len(shard_paths(folder))
+    if (manifest.shards, manifest.rows) != (shards, rows):
+        message = f"{shards} shards with {rows} rows, where the manifest says {manifest.shards} with {manifest.rows}"
+        raise InputError(message, file=Path(folder) / ROWS)
+
+
+def broken_shard(path: Path, error: Exception) -> InputError:
+    """The one line about a shard that is no Parquet file, or one cut short."""
+    first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
+    return InputError(f"is damaged, or no Parquet file: {first_line}", file=path)
+
+
+def shard_path(folder: str | Path, shard: int) -> Path:
+    """Where a shard lies."""
+    return Path(folder) / ROWS / f"part-{shard:05d}.parquet"
+
+
+def shard_number(path: Path) -> int:
+    """The number in a shard's name."""
+    return int(path.stem.removeprefix("part-"))
+
+
+def shard_paths(folder: str | Path) -> list[Path]:
+    """The shards of a folder in the order of their numbers."""
+    return sorted((Path(folder) / ROWS).glob("part-*.parquet"), key=shard_number)
