@@ -1,0 +1,88 @@
+"""Reading moves off a cost-to-go field, with one rule for ties."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import lax
+from jaxtyping import Array, Bool, Float, Int, Int8
+
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, blocked_cells, move_cost
+
+TIE = 1e-6  # relative: ways whose costs differ by less are equally good; ten roundings of a float32
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Path:
+    """Cells from start to goal, and the moves between them; filled up with -1."""
+
+    cells_ij: Int[Array, "B L1 2"]  # L1 = max_length + 1
+    directions: Int8[Array, "B L"]  # move from cell k to cell k + 1
+    length: Int[Array, "B"]  # number of moves
+    cost: Float[Array, "B"]  # inf: no way
+    valid: Bool[Array, "B"]  # reaches the goal within max_length moves
+
+
+def pick(ahead: Float[Array, "B 8"], downhill: Bool[Array, "B 8"], heading: Int[Array, "B"]) -> Int8[Array, "B"]:
+    """The direction to take, -1 for none, where direction k costs `ahead[k]` all the way to the goal.
+
+    Ties: of the directions within `TIE` of the best, the present heading if it is among them (fewer turns),
+    else the first in the order of `DIRECTIONS`. Only `downhill` directions count, so that reading ends.
+    """
+    ahead = jnp.where(downhill, ahead, jnp.inf)
+    best = ahead.min(-1, keepdims=True)
+    good = (ahead <= best * (1 + TIE)) & jnp.isfinite(ahead)
+    keeps = jnp.take_along_axis(good, jnp.maximum(heading, 0)[:, None], -1)[:, 0] & (heading >= 0)
+    choice = jnp.where(keeps, heading, jnp.argmax(good, -1))
+    return jnp.where(good.any(-1), choice, -1).astype(jnp.int8)
+
+
+def next_step(
+    field_cost: Float[Array | np.ndarray, "B H W"],
+    classes: Int[Array | np.ndarray, "B H W"],
+    levels: Int[Array | np.ndarray, "B H W"],
+    costs: Costs,
+    rules: Rules,
+    ij: Int[Array | np.ndarray, "B 2"],
+    heading: Int[Array | np.ndarray, "B"],
+    length: int = 1,
+) -> Int8[Array, "B {length}"]:
+    """First `length` moves of the path from each robot's cell, read off `field(...).cost`.
+
+    Edge costs are computed around the cell only. The path of `read_path`, with the robot's present `heading`
+    (a direction, -1 for none) as the move before the first. -1 where the path has ended, where there is none,
+    and on a plateau of moves that cost nothing (`read_path` crosses those).
+    """
+    field_cost, classes, levels = jnp.asarray(field_cost), jnp.asarray(classes), jnp.asarray(levels)
+    arena = jnp.arange(field_cost.shape[0])[:, None]
+    offsets = jnp.asarray(DIRECTIONS)
+
+    def cell(array, ij, outside):
+        i, j = ij[..., 0], ij[..., 1]
+        inside = (i >= 0) & (i < array.shape[1]) & (j >= 0) & (j < array.shape[2])
+        return jnp.where(inside, array[arena, jnp.where(inside, i, 0), jnp.where(inside, j, 0)], outside)
+
+    def step(state, _):
+        ij, heading = state
+        around = ij[:, None] + offsets
+        near = cell(classes, around, int(Cell.OBSTACLE)), cell(levels, around, 0)
+        here = cell(classes, ij[:, None], int(Cell.OBSTACLE))[:, 0], cell(levels, ij[:, None], 0)[:, 0]
+        blocked = blocked_cells(near[0].T, rules)
+        moves = []
+        for k in range(8):
+            # the orthogonal neighbours of an oblique direction are the directions next to it
+            sides = (blocked[(k - 1) % 8], blocked[(k + 1) % 8])
+            ends = (blocked_cells(here[0], rules), *here), (blocked[k], near[0][:, k], near[1][:, k])
+            moves.append(move_cost(k, *ends, *sides, costs, rules))
+        own, ahead = cell(field_cost, ij[:, None], jnp.inf), cell(field_cost, around, jnp.inf)
+        direction = pick(jnp.stack(moves, -1) + ahead, ahead < own, heading)
+        moved = jnp.where(direction[:, None] >= 0, ij + offsets[direction], ij)
+        return (moved, jnp.where(direction >= 0, direction, heading).astype(heading.dtype)), direction
+
+    state = jnp.asarray(ij, jnp.int32), jnp.asarray(heading, jnp.int32)
+    return lax.scan(step, state, None, length=length)[1].T
