@@ -1,0 +1,101 @@
+"""One turn of the closed loop (paper, Fig. 2): sense, decide, execute; for a batch of missions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Int
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.decision import Thought, climbed, decide
+from jaxbiped.mission.executors import EXECUTORS, Execution
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.state import Mind, World
+from jaxbiped.motion.primitives import Command
+from jaxbiped.sensing import Sightings, View, measure_oracle, measure_raycast, predict, sight_landmarks
+from jaxbiped.sensing.hashing import fold
+
+SENSE = 1  # channel of a mission's seed
+
+
+def cycle(
+    world: World, mind: Mind, arena: Arena, settings: Settings, program: Program
+) -> tuple[World, Mind, View, Command, Thought]:
+    """Every mission of the batch, one decision on. Missions that have ended do not change.
+
+    Consumes channels SENSE and ODOMETRY of each mission's seed, counted by its decisions.
+    """
+    view, sightings = jax.vmap(sense, in_axes=(0, 0, 0, 0, None))(world, mind, arena, settings, program)
+    if program.sensor == "oracle":
+        mind = replace(mind, belief=replace(mind.belief, pose=on_level(world.pose, program)))
+    thinking, command, verdict, thought = decide(mind, view, sightings, arena, settings, program.spec)
+    executed = jax.vmap(EXECUTORS[program.executor])(arena, world, command, settings)
+    after, moved = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
+        world, thinking, command, verdict, executed, arena, settings, program
+    )
+    running = world.code == Code.RUNNING
+    after = jax.tree.map(lambda new, old: jnp.where(running.reshape(-1, *[1] * (new.ndim - 1)), new, old), after, world)
+    return after, moved, view, command, thought
+
+
+def sense(world: World, mind: Mind, arena: Arena, settings: Settings, program: Program) -> tuple[View, Sightings]:
+    """What one robot measures from where it really stands."""
+    seed = fold(world.seed, SENSE, world.decisions)
+    if program.sensor == "oracle":
+        view = measure_oracle(arena, world.pose, (program.spec.size_x, program.spec.size_y))
+    else:
+        view = measure_raycast(
+            arena, world.pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat
+        )
+    return view, sight_landmarks(
+        arena, world.pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
+    )
+
+
+def on_level(pose: Pose, program: Program) -> Pose:
+    """A true pose as the robot would hold it: its height a whole level."""
+    return replace(pose, z=jnp.round(pose.z / program.spec.level_height) * program.spec.level_height)
+
+
+def conclude(
+    world: World,
+    mind: Mind,
+    command: Command,
+    verdict: Int[Array, ""],
+    executed: Execution,
+    arena: Arena,
+    settings: Settings,
+    program: Program,
+) -> tuple[World, Mind]:
+    """One mission after its command: the robot counts its odometry, the referee looks."""
+    stays = verdict != Code.RUNNING
+    belief = predict(mind.belief, *executed.moved, executed.variances)
+    belief = replace(belief, pose=climbed(belief.pose, command.rise, program.spec))
+    pose = jax.tree.map(lambda new, old: jnp.where(stays, old, new), executed.pose, world.pose)
+    time = world.time + settings.durations.measure + jnp.where(stays, 0.0, executed.time)
+    decisions = world.decisions + 1
+    away = jnp.hypot(arena.goal_xy[0] - pose.x, arena.goal_xy[1] - pose.y)
+
+    code = jnp.where(decisions >= settings.limits.max_decisions, Code.OUT_OF_STEPS, Code.RUNNING)
+    code = jnp.where(stays, verdict, code)
+    code = jnp.where(away <= settings.limits.goal_radius, Code.REACHED, code)
+    code = jnp.where(~stays & executed.outside, Code.OUT_OF_BOUNDS, code)
+    code = jnp.where(~stays & executed.fell, Code.FELL, code)
+    code = jnp.where(~stays & executed.collided, Code.COLLIDED, code)
+    sane = jnp.isfinite(away + time + pose.yaw + belief.pose.x + belief.pose.y + belief.pose.yaw)
+    code = jnp.where(sane, code, Code.INVALID).astype(jnp.int32)
+    world = World(
+        pose=pose,
+        squat=jnp.where(stays, world.squat, command.squat),
+        distance=world.distance + jnp.where(stays, 0.0, executed.distance),
+        time=time,
+        measurements=world.measurements + 1,
+        decisions=decisions,
+        code=code,
+        seed=world.seed,
+    )
+    return world, replace(mind, belief=belief)

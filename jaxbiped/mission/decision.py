@@ -1,0 +1,140 @@
+"""The decision: localise, update the map, plan, select (paper, Fig. 2). One pure function of a batch of missions.
+
+This is the place where rooms that are written for one arena are vmapped. The planner takes the whole batch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxbiped import mapping, planning
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.pose import Pose, wrap_angle
+from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import Settings
+from jaxbiped.mission.state import Mind
+from jaxbiped.motion.primitives import Command, Primitive
+from jaxbiped.motion.selection import cell_of, select, stride
+from jaxbiped.sensing import Sightings, View, correct
+
+LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is known
+TRIES = 4  # measurements in a row without a path that end the mission: once around
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Thought:
+    """What led to a command; for logs and pictures."""
+
+    classes: Int[Array, "B H W"]
+    levels: Int[Array, "B H W"]
+    cost: Float[Array, "B H W"]  # cost to go
+    ij: Int[Array, "B 2"]
+    goal_ij: Int[Array, "B 2"]
+
+
+def decide(
+    mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, spec: GridSpec
+) -> tuple[Mind, Command, Int[Array, "B"], Thought]:
+    """What each robot does next. All arguments have a leading batch axis.
+
+    Of the arena only what the robot was told is read: landmarks and goal (paper, 2, conditions 2 and 3).
+
+    Returns:
+      The mind after the measurement, the command, the code with which the mission ends of the robot's own
+      will (else RUNNING), and the thought.
+    """
+    mind, classes, levels, ij, goal_ij = jax.vmap(perceive, in_axes=(0, 0, 0, 0, 0, None))(
+        mind, view, sightings, arena, settings, spec
+    )
+    blind = settings.strategy.blind
+    plan_classes = jnp.where(blind[:, None, None], jnp.int8(Cell.FLOOR), classes)
+    plan_levels = jnp.where(blind[:, None, None], jnp.int8(0), levels)
+    costs, rules = settings.costs.at_pitch(spec.pitch), settings.strategy.rules()
+    to_go = planning.field(plan_classes, plan_levels, costs, rules, goal_ij)
+    heading = jax.vmap(nearest_direction)(mind.belief.pose.yaw)
+    directions = planning.next_step(
+        to_go.cost, plan_classes, plan_levels, costs, rules, ij, heading, length=stride(spec)
+    )
+    mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
+        mind, ij, goal_ij, directions, classes, levels, blind, spec
+    )
+    return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij)
+
+
+def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, spec: GridSpec):
+    """One robot after a measurement: its mind, the classed map, its cell and the goal's."""
+    belief = correct(mind.belief, arena.landmarks, sightings)
+    pose = belief.pose
+    level = jnp.round(pose.z / spec.level_height).astype(jnp.int8)
+    untouched = jnp.sum(mind.grid_map.votes) == 0
+    radius = jnp.where(untouched, settings.limits.body_radius, -1.0)
+    grid_map = mind.grid_map
+    marked = mapping.mark_footprint(grid_map, pose.x, pose.y, level, radius, spec)
+    grid_map = jax.tree.map(lambda new, old: jnp.where(untouched, new, old), marked, grid_map)
+    grid_map = mapping.update(grid_map, view, pose, settings.body, settings.mapping, spec)
+    classes, levels = mapping.classify(grid_map, settings.mapping, spec)
+    ij = cell_of(pose.x, pose.y, spec)
+    goal_ij = cell_of(arena.goal_xy[0], arena.goal_xy[1], spec)
+    # Where the robot stands it can stand, on the level that it stands on, whatever the map makes of it.
+    own = classes[ij[0], ij[1]]
+    ground = jnp.where(level > 0, Cell.BUMP, Cell.FLOOR).astype(jnp.int8)
+    classes = classes.at[ij[0], ij[1]].set(jnp.where(own == Cell.GATE, own, ground))
+    levels = levels.at[ij[0], ij[1]].set(level)
+    return replace(mind, belief=belief, grid_map=grid_map), classes, levels, ij, goal_ij
+
+
+def choose(
+    mind: Mind,
+    ij: Int[Array, "2"],
+    goal_ij: Int[Array, "2"],
+    directions: Int[Array, "n"],
+    classes: Int[Array, "H W"],
+    levels: Int[Array, "H W"],
+    blind: Bool[Array, ""],
+    spec: GridSpec,
+) -> tuple[Mind, Command, Int[Array, ""]]:
+    """The command of one robot, and whether it gives up.
+
+    In the goal's cell there is nowhere to go: if the referee has not ended the mission by then, the robot is stuck.
+    Without a path it turns on the spot and measures again, all around, before it gives up. The blind strategy
+    stops before anything but floor.
+    """
+    command = select(mind.belief.pose, ij, jnp.maximum(directions, 0), classes, levels, mind.look, spec)
+    at_goal = jnp.all(ij == goal_ij)
+    lost = (directions[0] < 0) & ~at_goal
+    tries = jnp.where(lost, mind.tries + 1, 0)
+    step = jnp.asarray(planning.DIRECTIONS)[jnp.maximum(directions[0], 0)]
+    i, j = ij[0] + step[0], ij[1] + step[1]
+    ahead, climb = classes[i, j], levels[i, j] - levels[ij[0], ij[1]]
+    halted = blind & ~lost & (((ahead != Cell.FLOOR) & (ahead != Cell.UNMEASURED)) | (climb != 0))
+
+    verdict = jnp.where(tries >= TRIES, Code.NO_PATH, Code.RUNNING)
+    verdict = jnp.where(at_goal | halted, Code.STUCK, verdict)
+    still = lost | (verdict != Code.RUNNING)
+    zero = jnp.zeros(())
+    command = Command(
+        turn=jnp.where(still, jnp.where(lost, LOOK_AROUND, zero), command.turn),
+        primitive=jnp.where(still, Primitive.NONE, command.primitive),
+        length=jnp.where(still, zero, command.length),
+        rise=jnp.where(still, 0, command.rise),
+        squat=jnp.where(still | (command.primitive == Primitive.LOOK), mind.squat, command.squat),
+    )
+    look = command.primitive == Primitive.LOOK
+    return replace(mind, squat=command.squat, look=look, tries=tries), command, verdict.astype(jnp.int32)
+
+
+def nearest_direction(yaw: Float[Array, ""]) -> Int[Array, ""]:
+    """Index into DIRECTIONS of the move that a yaw [rad] points along most."""
+    moves = jnp.asarray(planning.DIRECTIONS, jnp.float32)
+    return jnp.argmin(jnp.abs(wrap_angle(jnp.arctan2(moves[:, 0], moves[:, 1]) - yaw))).astype(jnp.int32)
+
+
+def climbed(pose: Pose, rise: Int[Array, ""], spec: GridSpec) -> Pose:
+    """The believed pose after a step of `rise` levels: heights are counted, not measured."""
+    return replace(pose, z=pose.z + rise * spec.level_height)

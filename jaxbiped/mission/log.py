@@ -1,0 +1,57 @@
+"""What one mission looked like, step by step, on the host: for pictures, films and printed logs. Plain NumPy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int8
+
+KINDS = ("obstacle", "bump", "gate")  # of an outline
+MARKS = ("circle", "square")  # of a landmark
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The plan view of one true box."""
+
+    corners_xy: Float[np.ndarray, "4 2"]  # [m] in order around the box
+    kind: str  # one of KINDS
+
+
+@dataclass(frozen=True)
+class Mark:
+    """One landmark on the floor."""
+
+    xy: tuple[float, float]  # [m] centre
+    yaw: float  # [rad]; of no meaning for a circle
+    kind: str  # one of MARKS
+
+
+@dataclass(frozen=True)
+class MissionLog:
+    """`T` moments of one mission: the first before anything is done, then one after each action.
+
+    `classes`, `levels` and `plan` are what the robot believed at the moment, in the world frame.
+    """
+
+    classes: Int8[np.ndarray, "T H W"]  # `Cell` of each cell
+    levels: Int8[np.ndarray, "T H W"]  # level of the ground
+    true_xyyaw: Float[np.ndarray, "T 3"]  # [m, m, rad] where the robot was
+    estimated_xyyaw: Float[np.ndarray, "T 3"]  # [m, m, rad] where it believed to be
+    plan: tuple[Float[np.ndarray, "n 2"], ...]  # T paths ahead [m], each from 0 points (no path) up
+    time: Float[np.ndarray, "T"]  # [s] since the start
+    action: tuple[str, ...]  # T names of what was done just before, "Start" for the first
+    pitch: float  # [m]
+    origin_xy: Float[np.ndarray, "2"]  # [m] outer corner of cell (0, 0)
+    size_xy: Float[np.ndarray, "2"]  # [m] of the arena, from (0, 0)
+    goal_xy: Float[np.ndarray, "2"]  # [m]
+    outlines: tuple[Outline, ...] = ()  # true boxes
+    landmarks: tuple[Mark, ...] = ()
+    outcome: str = ""  # how it ended, "reached" say
+
+    def __post_init__(self):
+        count = len(self.time)
+        for name in ("classes", "levels", "true_xyyaw", "estimated_xyyaw", "plan", "action"):
+            if len(getattr(self, name)) != count or count == 0:
+                raise ValueError(f"{name} has {len(getattr(self, name))} moments, time has {count}; at least 1 each")

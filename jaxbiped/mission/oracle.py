@@ -1,0 +1,67 @@
+"""The oracle plan: what each strategy could do with perfect knowledge.
+
+It tells failures of sensing from failures of planning, and an arena that cannot be solved from one that was not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxbiped import planning
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.mapping import Cell, truth_grid
+from jaxbiped.mission.decision import nearest_direction
+from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.motion.selection import cell_of
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class OraclePlan:
+    """For each of the settings and each arena."""
+
+    reachable: Bool[Array, "P A"]
+    cost: Float[Array, "P A"]  # of Eq. (1), from the start's cell to the goal's; inf where there is no path
+
+
+@partial(jax.jit, static_argnames=("program",))
+def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePlan:
+    """Plans on the true class grid of each arena [A], under each of the settings [P].
+
+    `blind_stop` has one way, the one that it plans on an empty floor; its goal is reachable when that way is floor.
+    """
+    spec = program.spec
+    start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(arenas.start_xyyaw[:, 0], arenas.start_xyyaw[:, 1], spec)
+    goal_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(arenas.goal_xy[:, 0], arenas.goal_xy[:, 1], spec)
+    heading = jax.vmap(nearest_direction)(arenas.start_xyyaw[:, 2])
+    row = jnp.arange(start_ij.shape[0])
+
+    def plan(setting: Settings) -> Float[Array, "A"]:
+        classes, levels = jax.vmap(truth_grid, in_axes=(0, None, None))(arenas, spec, setting.body)
+        costs, rules = setting.costs.at_pitch(spec.pitch), setting.strategy.rules()
+        floor, flat = jnp.full_like(classes, Cell.FLOOR), jnp.zeros_like(levels)
+        blind = setting.strategy.blind
+        grid, ground = jnp.where(blind, floor, classes), jnp.where(blind, flat, levels)
+        to_go = planning.field(grid, ground, costs, rules, goal_ij).cost
+        cost = to_go[row, start_ij[:, 0], start_ij[:, 1]]
+        moves = planning.next_step(to_go, grid, ground, costs, rules, start_ij, heading, length=max(spec.shape))
+        free = way_is_floor(start_ij, moves, classes)
+        return jnp.where(blind & ~free, jnp.inf, cost)
+
+    cost = jax.lax.map(plan, settings)
+    return OraclePlan(jnp.isfinite(cost), cost)
+
+
+def way_is_floor(
+    start_ij: Int[Array, "A 2"], moves: Int[Array, "A L"], classes: Int[Array, "A H W"]
+) -> Bool[Array, "A"]:
+    """Whether every cell that the moves enter is floor."""
+    steps = jnp.where((moves >= 0)[..., None], jnp.asarray(planning.DIRECTIONS)[jnp.maximum(moves, 0)], 0)
+    cells = start_ij[:, None] + jnp.cumsum(steps, axis=1)
+    row = jnp.arange(start_ij.shape[0])[:, None]
+    return jnp.all(classes[row, cells[..., 0], cells[..., 1]] == Cell.FLOOR, axis=1)

@@ -1,0 +1,24 @@
+"""How a mission ends."""
+
+from __future__ import annotations
+
+import enum
+
+
+class Code(enum.IntEnum):
+    """The one code that each mission ends with."""
+
+    RUNNING = -1
+    REACHED = 0  # stands within 10 cm of the goal (paper, 3.1)
+    NO_PATH = 1  # looked around, and no path to the goal is left on the map
+    STUCK = 2  # the strategy stops here (blind_stop), or the robot believes to be there and is not
+    COLLIDED = 3
+    FELL = 4
+    OUT_OF_BOUNDS = 5
+    OUT_OF_STEPS = 6
+    INVALID = 7  # NaN or overflow
+
+    @property
+    def label(self) -> str:
+        """As in tables."""
+        return self.name.lower()

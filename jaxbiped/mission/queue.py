@@ -1,0 +1,155 @@
+"""The compiled driver: a queue of missions worked off by a fixed number of slots.
+
+Missions differ in length by a factor of ten, and a batch that waits for its longest member idles most of its slots. So
+a slot whose mission has ended takes the next job at once, inside the compiled loop. What a slot computes
+does not depend on its neighbours, hence a mission's result depends neither on the number of slots nor on its
+place in the queue.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.mission.cycle import cycle
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.state import Mind, World, start
+
+SLOTS = 64  # missions at once: maps of this many arenas fit the cache of one core
+TURNS = 32  # decisions between two looks of the host at the queue
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Jobs:
+    """`N` missions to run: which arena, under which settings, with which noise."""
+
+    arena: Int[Array, "N"]  # index into the arenas
+    point: Int[Array, "N"]  # index into the settings
+    seed: UInt32[Array, "N"]
+    count: Int[Array, ""]  # jobs from here on are padding
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Result:
+    """How each mission ended."""
+
+    code: Int[Array, "N"]  # Code; RUNNING where it has not
+    distance: Float[Array, "N"]  # [m] walked
+    time: Float[Array, "N"]  # [s]
+    measurements: Int[Array, "N"]
+    decisions: Int[Array, "N"]
+    goal_distance: Float[Array, "N"]  # [m] from the goal, at the end
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Queue:
+    """The state between two segments of the loop."""
+
+    world: World  # [S]
+    mind: Mind  # [S]
+    job: Int[Array, "S"]  # that the slot works on; count or more: idle
+    next_job: Int[Array, ""]
+    result: Result
+
+
+def run(
+    arenas: Arena,
+    settings: Settings,
+    jobs: Jobs,
+    program: Program,
+    slots: int = SLOTS,
+    on_progress: Callable[[int], None] | None = None,
+) -> Result:
+    """Work the queue off.
+
+    Args:
+      arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
+      program: static. One compilation for each (program, slots, A, P, N).
+      slots: static.
+      on_progress: called on the host with the number of jobs that have ended, every `TURNS` decisions.
+
+    Returns:
+      Results in the order of the jobs; padding stays RUNNING.
+    """
+    queue = fill(arenas, settings, jobs, program, slots)
+    while True:
+        queue = segment(queue, arenas, settings, jobs, program)
+        ended, idle = jax.device_get((jnp.sum(queue.result.code != Code.RUNNING), jnp.all(queue.job >= jobs.count)))
+        if on_progress:
+            on_progress(int(ended))
+        if idle:
+            return queue.result
+
+
+@partial(jax.jit, static_argnames=("program", "slots"))
+def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int) -> Queue:
+    """The queue with its first jobs in the slots."""
+    job = jnp.arange(slots, dtype=jnp.int32)
+    world, mind = begin(arenas, settings, jobs, job, program)
+    zero, none = jnp.zeros(jobs.arena.shape), jnp.zeros(jobs.arena.shape, jnp.int32)
+    result = Result(none + Code.RUNNING, zero, zero, none, none, zero)
+    return Queue(world, mind, job, jnp.int32(slots), result)
+
+
+@partial(jax.jit, static_argnames=("program",), donate_argnames=("queue",))
+def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program: Program) -> Queue:
+    """Up to `TURNS` decisions of every slot."""
+
+    def unfinished(carry: tuple[Array, Queue]):
+        turns, queue = carry
+        return (turns < TURNS) & jnp.any(queue.job < jobs.count)
+
+    def turn(carry: tuple[Array, Queue]):
+        turns, queue = carry
+        at = jnp.minimum(queue.job, jobs.arena.shape[0] - 1)
+        arena = pick(arenas, jobs.arena[at])
+        world, mind, *_ = cycle(queue.world, queue.mind, arena, pick(settings, jobs.point[at]), program)
+        return turns + 1, advance(Queue(world, mind, queue.job, queue.next_job, queue.result), arena)
+
+    def advance(queue: Queue, arena: Arena) -> Queue:
+        """Write down the missions that have ended, and give their slots the next jobs."""
+        world = queue.world
+        ended = (queue.job < jobs.count) & (world.code != Code.RUNNING)
+        away = jnp.hypot(arena.goal_xy[:, 0] - world.pose.x, arena.goal_xy[:, 1] - world.pose.y)
+        last = Result(world.code, world.distance, world.time, world.measurements, world.decisions, away)
+        row = jnp.where(ended, queue.job, jobs.arena.shape[0])
+        result = jax.tree.map(lambda all, new: all.at[row].set(new, mode="drop"), queue.result, last)
+        job = jnp.where(ended, queue.next_job + jnp.cumsum(ended) - 1, queue.job).astype(jnp.int32)
+        fresh_world, fresh_mind = begin(arenas, settings, jobs, job, program)
+
+        def renew(new, old):
+            return jnp.where(ended.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+
+        world = jax.tree.map(renew, fresh_world, world)
+        mind = jax.tree.map(renew, fresh_mind, queue.mind)
+        return Queue(world, mind, job, queue.next_job + jnp.sum(ended, dtype=jnp.int32), result)
+
+    return jax.lax.while_loop(unfinished, turn, (jnp.int32(0), queue))[1]
+
+
+def begin(arenas: Arena, settings: Settings, jobs: Jobs, job: Int[Array, "S"], program: Program) -> tuple[World, Mind]:
+    """Fresh missions for the jobs of all slots."""
+    at = jnp.minimum(job, jobs.arena.shape[0] - 1)
+    arena, setting = pick(arenas, jobs.arena[at]), pick(settings, jobs.point[at])
+    return jax.vmap(start, in_axes=(0, 0, 0, None))(arena, setting, jobs.seed[at], program.spec)
+
+
+def pick(tree, index: Int[Array, "S"]):
+    """Rows `index` of every leaf."""
+    return jax.tree.map(lambda leaf: leaf[index], tree)
+
+
+def stack(trees: list):
+    """Pytrees of the same kind as one, with a new leading axis."""
+    return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *trees)

@@ -1,0 +1,154 @@
+"""Everything a mission depends on besides its arena: the config for people, and its traced form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import jax
+import jax.numpy as jnp
+import pydantic
+from jaxtyping import Array, Float, Int
+
+from jaxbiped.config import Model
+from jaxbiped.mapping import Body, GridSpec, MapConfig, MapParams
+from jaxbiped.mission.strategies import Strategy, strategy
+from jaxbiped.motion.primitives import DurationConfig, Durations
+from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.planning import Costs
+from jaxbiped.sensing import (
+    Camera,
+    CameraConfig,
+    ImageSpec,
+    LandmarkConfig,
+    LandmarkNoise,
+    NoiseConfig,
+    OdometryConfig,
+    OdometryNoise,
+    StereoNoise,
+)
+
+Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e6)]
+
+
+class CostConfig(Model):
+    """Costs of Eq. (1) on a pitch of 5 cm; the paper's values (3.1). Other pitches: `planning.Costs.at_pitch`."""
+
+    c0: Cost = 1.0
+    """Distance, a cell."""
+    c1: Cost = 1.0
+    """Floor to floor."""
+    c2: Cost = 5.0
+    """Through a gate, squatting."""
+    c3: Cost = 10.0
+    """Up or down one step."""
+    c4: Cost = 100.0
+    """Into what is unmeasured."""
+
+
+class LimitConfig(Model):
+    """When a mission ends."""
+
+    goal_radius: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.10
+    """[m] reached when this near to the goal (paper, 3.1)."""
+    max_decisions: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 150
+    """Decisions after which a mission is out of steps."""
+    edge_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.02
+    """[m] that an edge may lie off under the robot before it falls; simulated bipeds fell from 0.025 on."""
+    height_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.010
+    """[m] that the ground may be off the height stepped to; simulated bipeds took -12 to +8 mm."""
+    start_sd: tuple[float, float] = (0.002, 0.005)
+    """[m, rad] how well the robot knows where it starts."""
+
+
+class MissionConfig(Model):
+    """One kind of mission. Every default is the paper's value, or named where it is chosen."""
+
+    sensor: Literal["raycast", "oracle"] = "raycast"
+    executor: Literal["kinematic"] = "kinematic"
+    pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
+    """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
+    corner_cutting: bool = False
+    """May an oblique move pass one blocked cell?"""
+    costs: CostConfig = CostConfig()
+    durations: DurationConfig = DurationConfig()
+    robot: RobotConfig = RobotConfig()
+    camera: CameraConfig = CameraConfig()
+    stereo: NoiseConfig = NoiseConfig()
+    landmarks: LandmarkConfig = LandmarkConfig()
+    odometry: OdometryConfig = OdometryConfig()
+    mapping: MapConfig = MapConfig()
+    limits: LimitConfig = LimitConfig()
+
+    def grid(self, size_xy: tuple[float, float]) -> GridSpec:
+        """The static grid of an area [m]; InputError when the pitch does not divide it."""
+        return GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch)
+
+    def settings(self, strategy_name: str) -> Settings:
+        """The traced part, for one strategy."""
+        limits = self.limits
+        sd, sd_yaw = limits.start_sd
+        return Settings(
+            strategy=strategy(strategy_name, self.corner_cutting),
+            costs=Costs(**{name: jnp.float32(value) for name, value in self.costs.model_dump().items()}),
+            durations=self.durations.traced(),
+            body=self.robot.body(),
+            camera=self.camera.traced(),
+            stereo=self.stereo.traced(),
+            landmarks=self.landmarks.traced(),
+            odometry=self.odometry.traced(),
+            mapping=self.mapping.params(),
+            limits=Limits(
+                goal_radius=jnp.float32(limits.goal_radius),
+                max_decisions=jnp.int32(limits.max_decisions),
+                edge_tolerance=jnp.float32(limits.edge_tolerance),
+                height_tolerance=jnp.float32(limits.height_tolerance),
+                body_radius=jnp.float32(self.robot.body_radius),
+                start_variance=jnp.array([sd**2, sd**2, sd_yaw**2], jnp.float32),
+            ),
+        )
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Limits:
+    """`LimitConfig`, traced, and the radius of the body that collides."""
+
+    goal_radius: Float[Array, "*B"]  # [m]
+    max_decisions: Int[Array, "*B"]
+    edge_tolerance: Float[Array, "*B"]  # [m]
+    height_tolerance: Float[Array, "*B"]  # [m]
+    body_radius: Float[Array, "*B"]  # [m]
+    start_variance: Float[Array, "*B 3"]  # [m2, m2, rad2]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Settings:
+    """Every number that a sweep may change. All leaves are traced, scalars or with a leading batch axis."""
+
+    strategy: Strategy
+    costs: Costs
+    durations: Durations
+    body: Body
+    camera: Camera
+    stereo: StereoNoise
+    landmarks: LandmarkNoise
+    odometry: OdometryNoise
+    mapping: MapParams
+    limits: Limits
+
+
+@dataclass(frozen=True)
+class Program:
+    """What sets array shapes and code paths: a mission program is compiled once for each of these. Hashable."""
+
+    spec: GridSpec
+    image: ImageSpec
+    sensor: str
+    executor: str
+
+
+def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
+    """The static part of a config for arenas of one size [m]."""
+    return Program(config.grid(size_xy), config.camera.image, config.sensor, config.executor)

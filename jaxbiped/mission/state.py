@@ -1,0 +1,58 @@
+"""What is true of a mission at a moment, and what the robot makes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.boxes import ground_height
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mapping import GridMap, GridSpec, empty
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import Settings
+from jaxbiped.sensing import Belief
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class World:
+    """The referee's side: only sensors and executors read it, the robot never does."""
+
+    pose: Pose  # where the robot stands
+    squat: Bool[Array, "*B"]  # its stance
+    distance: Float[Array, "*B"]  # [m] walked
+    time: Float[Array, "*B"]  # [s]
+    measurements: Int[Array, "*B"]
+    decisions: Int[Array, "*B"]
+    code: Int[Array, "*B"]  # Code
+    seed: UInt32[Array, "*B"]  # of all noise of this mission
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Mind:
+    """The robot's side. The stance is known to both."""
+
+    belief: Belief  # pose and its covariance; pose.z is the height of the level that it stands on
+    grid_map: GridMap
+    squat: Bool[Array, "*B"]
+    look: Bool[Array, "*B"]  # the next measurement looks down before the feet
+    tries: Int[Array, "*B"]  # measurements in a row that showed no path
+
+
+def start(arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridSpec) -> tuple[World, Mind]:
+    """One mission before its first measurement. The robot knows where it starts (paper, 2, condition 2)."""
+    x, y, yaw = arena.start_xyyaw
+    pose = Pose(x, y, ground_height(arena.boxes, x, y), yaw)
+    away = jnp.hypot(arena.goal_xy[0] - x, arena.goal_xy[1] - y)
+    no, zero = jnp.zeros((), bool), jnp.zeros((), jnp.int32)
+    code = jnp.where(away <= settings.limits.goal_radius, Code.REACHED, Code.RUNNING).astype(jnp.int32)
+    code = jnp.where(jnp.isfinite(away) & jnp.isfinite(yaw), code, Code.INVALID)
+    world = World(pose, no, jnp.zeros(()), jnp.zeros(()), zero, zero, code, seed)
+    level = jnp.round(pose.z / spec.level_height)
+    belief = Belief(Pose(x, y, level * spec.level_height, yaw), jnp.diag(settings.limits.start_variance))
+    return world, Mind(belief, empty(spec), no, no, zero)

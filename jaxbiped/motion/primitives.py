@@ -1,0 +1,99 @@
+"""The pre-computed motion primitives (paper, 2.4 and Table 2) and how long they take."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Annotated
+
+import jax
+import jax.numpy as jnp
+import pydantic
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxbiped.config import Model
+
+CELL = 0.05  # [m] the length that Table 2 gives durations for
+EIGHTH = math.pi / 4  # [rad] the turn that Table 2 gives a duration for
+
+
+class Primitive(enum.IntEnum):
+    """What the robot plays after it has turned to its direction."""
+
+    NONE = 0
+    STRAIGHT_FORWARD = 1
+    STEP_UP_BUMP = 2
+    STEP_DOWN_BUMP = 3
+    PASS_GATE = 4
+    LOOK = 5  # stay, and tilt the camera down for one more measurement
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Command:
+    """One decision of the robot: a turn on the spot, then one primitive."""
+
+    turn: Float[Array, "*B"]  # [rad] anticlockwise
+    primitive: Int[Array, "*B"]  # Primitive
+    length: Float[Array, "*B"]  # [m] forward, after the turn
+    rise: Int[Array, "*B"]  # levels climbed: -1, 0 or 1
+    squat: Bool[Array, "*B"]  # stance in which the primitive is played
+
+
+class DurationConfig(Model):
+    """Durations [s]: Table 2 of the paper by default.
+
+    A measurement has no published time; about 10 s explains the mission times of Tables 3 and 4.
+    """
+
+    straight: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 16.0
+    """[s] for 5 cm forward."""
+    turn: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 5.0
+    """[s] for 45 degrees."""
+    step_up: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 96.0
+    """[s] for one step of 3 cm up, 5 cm forward."""
+    step_down: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 96.0
+    """[s] for one step of 3 cm down, 5 cm forward."""
+    pass_gate: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 48.0
+    """[s] for 5 cm forward, squatting; getting down and up is in it."""
+    measure: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 10.0
+    """[s] for one stereo measurement."""
+
+    def traced(self) -> Durations:
+        """The same as arrays."""
+        return Durations(**{name: jnp.float32(value) for name, value in self.model_dump().items()})
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Durations:
+    """`DurationConfig`, traced."""
+
+    straight: Float[Array, "*B"]
+    turn: Float[Array, "*B"]
+    step_up: Float[Array, "*B"]
+    step_down: Float[Array, "*B"]
+    pass_gate: Float[Array, "*B"]
+    measure: Float[Array, "*B"]
+
+
+def duration(command: Command, durations: Durations) -> Float[Array, "*B"]:
+    """Time [s] that a command takes (Table 2): turns by angle, straight and gate by length, steps by event.
+
+    A step over a bump carries the robot up to one oblique cell forward; what is longer is walked straight.
+    """
+    cells = command.length / CELL
+    beyond = jnp.maximum(cells - math.sqrt(2.0), 0.0) * durations.straight
+    spent = jnp.stack(
+        [
+            jnp.zeros_like(cells),
+            cells * durations.straight,
+            durations.step_up + beyond,
+            durations.step_down + beyond,
+            cells * durations.pass_gate,
+            jnp.zeros_like(cells),
+        ]
+    )
+    played = jnp.take_along_axis(spent, command.primitive[None].astype(jnp.int32), axis=0)[0]
+    return jnp.abs(command.turn) / EIGHTH * durations.turn + played
