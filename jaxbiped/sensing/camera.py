@@ -1,0 +1,197 @@
+"""The stereo camera on the robot: its numbers, its rays and where it sits.
+
+Camera frame: x right, y down, z along the optical axis, origin at the left camera's centre. Rays have z = 1, so that
+their parameter is the depth, and disparity = focal * baseline / depth. (Paper, 3.1: Bumblebee 2, 512 x 384, 12 cm.)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+from pydantic import Field, model_validator
+
+from jaxbiped.config import Model
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.geometry.small import matrix, product
+
+
+@dataclass(frozen=True)
+class ImageSpec:
+    """Pixels of the image and the rays that stand for them; static, since it sets array shapes.
+
+    Rays go through the centres of equal blocks of pixels. Pixel (0, 0) has its centre at (0, 0) and the
+    principal point is the middle of the image.
+    """
+
+    width: int = 512  # [px]
+    height: int = 384  # [px]
+    columns: int = 64  # rays across
+    rows: int = 48  # rays down
+
+    @property
+    def stride(self) -> tuple[float, float]:
+        """Pixels from a ray to the next, across and down."""
+        return self.width / self.columns, self.height / self.rows
+
+    @property
+    def pixels_per_ray(self) -> float:
+        """Weight of one ray."""
+        return self.width * self.height / (self.columns * self.rows)
+
+    @cached_property
+    def u(self) -> Float[np.ndarray, "columns"]:
+        """[px] column of each ray."""
+        return ((np.arange(self.columns) + 0.5) * self.stride[0] - 0.5).astype(np.float32)
+
+    @cached_property
+    def v(self) -> Float[np.ndarray, "rows"]:
+        """[px] row of each ray."""
+        return ((np.arange(self.rows) + 0.5) * self.stride[1] - 0.5).astype(np.float32)
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """[px] principal point (u, v)."""
+        return (self.width - 1) / 2, (self.height - 1) / 2
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Camera:
+    """What a sweep may change of the camera. All traced."""
+
+    focal: Float[Array, "*B"]  # [px]
+    baseline: Float[Array, "*B"]  # [m]
+    pitch: Float[Array, "*B"]  # [rad] below the horizon
+    look_pitch: Float[Array, "*B"]  # [rad] below the horizon when looking at the feet
+    height: Float[Array, "*B"]  # [m] of the optical centre above the supporting surface, standing
+    squat_drop: Float[Array, "*B"]  # [m] how much lower the camera is when squatting
+    forward: Float[Array, "*B"]  # [m] of the optical centre ahead of the robot's vertical axis
+    max_disparity: Float[Array, "*B"]  # [px] nearer surfaces cannot be matched
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Mount:
+    """Where the camera sits at a moment, as the robot believes: on its vertical plane of symmetry, pitched down."""
+
+    pitch: Float[Array, "*B"]  # [rad]
+    height: Float[Array, "*B"]  # [m]
+    forward: Float[Array, "*B"]  # [m]
+
+
+class CameraConfig(Model):
+    """A stereo camera. Size and baseline are the paper's (3.1); the rest of it is chosen.
+
+    At 97 degrees and 30 degrees of pitch the lintel of a gate is in view, which a lens of 66 degrees never sees.
+    """
+
+    width: int = Field(512, ge=16, le=8192)
+    """[px] image width."""
+    height: int = Field(384, ge=16, le=8192)
+    """[px] image height."""
+    columns: int = Field(64, ge=4)
+    """Rays across the image (ray-cast sensor); divides the width."""
+    rows: int = Field(48, ge=4)
+    """Rays down the image (ray-cast sensor); divides the height."""
+    baseline: float = Field(0.12, gt=0, le=1)
+    """[m] between the two cameras."""
+    field_of_view: float = Field(97.0, ge=10, le=160)
+    """[deg] across."""
+    pitch: float = Field(30.0, ge=-30, le=90)
+    """[deg] below the horizon."""
+    look_pitch: float = Field(60.0, ge=-30, le=90)
+    """[deg] below the horizon when the robot looks at the place before its feet."""
+    camera_height: float = Field(0.365, gt=0, le=3)
+    """[m] of the optical centre above the supporting surface, standing."""
+    squat_drop: float = Field(0.045, ge=0, le=2)
+    """[m] how much lower it is when squatting; less than its height."""
+    forward: float = Field(0.03, ge=-1, le=1)
+    """[m] of the optical centre ahead of the robot's vertical axis."""
+    num_disparities: int = Field(160, ge=16, le=1024, multiple_of=16)
+    """[px] search range of the matcher; sets the nearest distance that can be measured."""
+
+    @model_validator(mode="after")
+    def check_whole(self) -> CameraConfig:
+        for rays, pixels in (("columns", "width"), ("rows", "height")):
+            if getattr(self, pixels) % getattr(self, rays):
+                raise ValueError(
+                    f"{rays} must divide the {pixels} of {getattr(self, pixels)}, got {getattr(self, rays)}"
+                )
+        if self.squat_drop >= self.camera_height:
+            raise ValueError(f"squat_drop must be below the camera_height of {self.camera_height:g} m")
+        return self
+
+    @property
+    def image(self) -> ImageSpec:
+        """The static part."""
+        return ImageSpec(self.width, self.height, self.columns, self.rows)
+
+    @property
+    def focal(self) -> float:
+        """[px]"""
+        return self.width / 2 / math.tan(math.radians(self.field_of_view) / 2)
+
+    def traced(self) -> Camera:
+        """The traced part."""
+        values = {
+            "focal": self.focal,
+            "baseline": self.baseline,
+            "pitch": math.radians(self.pitch),
+            "look_pitch": math.radians(self.look_pitch),
+            "height": self.camera_height,
+            "squat_drop": self.squat_drop,
+            "forward": self.forward,
+            "max_disparity": self.num_disparities - 1,
+        }
+        return Camera(**{name: jnp.asarray(value, jnp.float32) for name, value in values.items()})
+
+
+def mount(camera: Camera, look: Bool[Array, ""] | bool = False, squat: Bool[Array, ""] | bool = False) -> Mount:
+    """Where the camera sits: `look` tilts it to the feet, `squat` lowers it."""
+    return Mount(
+        pitch=jnp.where(look, camera.look_pitch, camera.pitch),
+        height=camera.height - jnp.where(squat, camera.squat_drop, 0.0),
+        forward=camera.forward,
+    )
+
+
+def rays(camera: Camera, image: ImageSpec) -> tuple[Float[Array, "columns"], Float[Array, "rows"]]:
+    """Camera-frame x of each ray column and y of each ray row, at z = 1."""
+    return (image.u - image.centre[0]) / camera.focal, (image.v - image.centre[1]) / camera.focal
+
+
+def T_robot_camera(at: Mount) -> Float[Array, "4 4"]:
+    """The rigid transform that takes camera-frame points to the robot frame."""
+    cos, sin, zero, one = jnp.cos(at.pitch), jnp.sin(at.pitch), jnp.zeros_like(at.pitch), jnp.ones_like(at.pitch)
+    rows = (
+        (zero, -sin, cos, at.forward),
+        (-one, zero, zero, zero),
+        (zero, -cos, -sin, at.height),
+        (zero, zero, zero, one),
+    )
+    return matrix(rows)
+
+
+def tilt(roll: Float[Array, ""], pitch: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Rotation of the robot about its footprint: `roll` [rad] to the right, then `pitch` [rad] forward and down."""
+    cr, sr, cp, sp = jnp.cos(roll), jnp.sin(roll), jnp.cos(pitch), jnp.sin(pitch)
+    zero = jnp.zeros_like(cr)
+    return matrix(((cp, sp * sr, sp * cr), (zero, cr, -sr), (-sp, cp * sr, cp * cr)))
+
+
+def placed(
+    pose: Pose, at: Mount, roll: Float[Array, ""], pitch: Float[Array, ""]
+) -> tuple[Float[Array, "3"], Float[Array, "3 3"]]:
+    """Optical centre [m] and rotation of the camera in the world, for a robot tilted by roll and pitch [rad]."""
+    cos, sin, zero, one = jnp.cos(pose.yaw), jnp.sin(pose.yaw), jnp.zeros_like(pose.yaw), jnp.ones_like(pose.yaw)
+    R_world_level = matrix(((cos, -sin, zero), (sin, cos, zero), (zero, zero, one)))
+    R_world_robot = product(R_world_level, tilt(roll, pitch))
+    T = T_robot_camera(at)
+    shift = product(R_world_robot, T[:3, 3:])[:, 0]
+    return jnp.stack([pose.x, pose.y, pose.z]) + shift, product(R_world_robot, T[:3, :3])

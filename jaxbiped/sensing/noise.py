@@ -1,0 +1,214 @@
+"""What stereo matching makes of true disparities: its noise, its holes and its phantoms.
+
+The model that reproduces rendered pairs matched by a semi-global matcher, ray by ray: sub-pixel noise that grows
+with the slope of the surface and is correlated over neighbours, 1/16 px steps, surfaces that one camera cannot see,
+surfaces nearer than the search range, holes at edges, at grazing incidence and on plain texture, foreground
+fattening at edges, and clumped phantoms where nothing can be matched.
+
+On a plane disparity is an affine function of the pixel. So first differences give the slope of a surface, and second
+differences vanish except at edges: no normals or object numbers are needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, UInt32
+from pydantic import Field
+
+from jaxbiped.config import Model
+from jaxbiped.sensing import hashing
+from jaxbiped.sensing.camera import Camera, ImageSpec
+
+MATCH, PHANTOM, ATTITUDE = 1, 2, 3  # channels of a view's seed
+HIDING_REACH = 128  # [px] how far to the right of a pixel something may hide it
+PHANTOM_BLOCK = 12  # [px] size of a clump of phantoms
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class StereoNoise:
+    """All traced; see `NoiseConfig` for what each is."""
+
+    bias: Float[Array, "*B"]
+    sd: Float[Array, "*B"]
+    slope_gain: Float[Array, "*B"]
+    correlation: Float[Array, "*B"]
+    quantum: Float[Array, "*B"]
+    drop_plain: Float[Array, "*B"]
+    drop_edge: Float[Array, "*B"]
+    drop_grazing: Float[Array, "*B"]
+    edge_jump: Float[Array, "*B"]
+    grazing_slope: Float[Array, "*B"]
+    edge_swap: Float[Array, "*B"]
+    phantom_hidden: Float[Array, "*B"]
+    phantom_near: Float[Array, "*B"]
+    min_contrast: Float[Array, "*B"]
+    max_range: Float[Array, "*B"]
+    attitude_sd: Float[Array, "*B"]
+
+
+class NoiseConfig(Model):
+    """Noise of stereo matching. The defaults are those of the preset `rendered`."""
+
+    bias: float = Field(0.01, ge=-16, le=16)
+    """[px] added to each disparity."""
+    sd: float = Field(0.14, ge=0, le=16)
+    """[px] standard deviation of disparity on a surface without slope."""
+    slope_gain: float = Field(2.0, ge=0, le=100)
+    """Growth of that: times 1 + slope_gain * slope, with the slope of disparity across the image in px per px."""
+    correlation: float = Field(0.33, ge=0, le=0.5)
+    """Correlation of the noise of two neighbouring rays, across and down (0.33 at 8 px, 0.5 at 4 px)."""
+    quantum: float = Field(1 / 16, ge=0, le=16)
+    """[px] step of disparity; 0 for none."""
+    drop_plain: float = Field(0.03, ge=0, le=1)
+    """Chance that a ray is lost, anywhere."""
+    drop_edge: float = Field(0.20, ge=0, le=1)
+    """Chance that a ray is lost at an edge."""
+    drop_grazing: float = Field(0.45, ge=0, le=1)
+    """Chance that a ray is lost where the surface slopes by more than grazing_slope."""
+    edge_jump: float = Field(2.5, gt=0, le=1000)
+    """[px] second difference of disparity from which a ray counts as one at an edge."""
+    grazing_slope: float = Field(0.8, gt=0, le=100)
+    """[px/px] slope of disparity from which incidence counts as grazing; the floor has 0.3."""
+    edge_swap: float = Field(0.065, ge=0, le=1)
+    """Chance that a ray at an edge takes the disparity from across the edge."""
+    phantom_hidden: float = Field(0.02, ge=0, le=1)
+    """Share of what the right camera cannot see that comes out as clumps of one wild disparity each."""
+    phantom_near: float = Field(0.02, ge=0, le=1)
+    """The same for what is nearer than the search range."""
+    min_contrast: float = Field(0.1, ge=0, le=1)
+    """Texture contrast below which nothing is measured."""
+    max_range: float = Field(2.0, gt=0, le=100)
+    """[m] from the camera; points beyond are dropped."""
+    attitude_sd: float = Field(0.3, ge=0, le=20)
+    """[deg] standard deviation of the robot's roll and pitch in a view, which the reprojection does not know."""
+
+    def traced(self) -> StereoNoise:
+        """The same as traced arrays, angles in radians."""
+        values = self.model_dump() | {"attitude_sd": np.deg2rad(self.attitude_sd)}
+        return StereoNoise(
+            **{field.name: jnp.asarray(values[field.name], jnp.float32) for field in fields(StereoNoise)}
+        )
+
+
+RENDERED = NoiseConfig()
+IDEAL = NoiseConfig(
+    bias=0,
+    sd=0,
+    quantum=0,
+    drop_plain=0,
+    drop_edge=0,
+    drop_grazing=0,
+    edge_swap=0,
+    phantom_hidden=0,
+    phantom_near=0,
+    min_contrast=0,
+    attitude_sd=0,
+)
+REAL = NoiseConfig(bias=0.06, sd=0.22, edge_swap=0.11, phantom_hidden=0.4, attitude_sd=0.5)
+
+
+def attitude_error(noise: StereoNoise, seed: UInt32[Array, ""]) -> tuple[Float[Array, ""], Float[Array, ""]]:
+    """Roll and pitch [rad] of the robot in the view of this seed."""
+    draw = hashing.normal(seed, np.arange(2), ATTITUDE) * noise.attitude_sd
+    return draw[0], draw[1]
+
+
+def match(
+    disparity: Float[Array, "padded_rows padded_columns"],
+    textured: Bool[Array, "rows columns"],
+    camera: Camera,
+    image: ImageSpec,
+    noise: StereoNoise,
+    seed: UInt32[Array, ""],
+) -> Float[Array, "rows columns"]:
+    """Measured disparity [px] of each ray; 0 where none was.
+
+    Args:
+      disparity: the true one [px], with a margin of one ray on all sides; 0 where there is nothing to see.
+      textured: whether what is seen has texture enough.
+      seed: of this view; the channels MATCH and PHANTOM are used.
+    """
+    shape = (image.rows, image.columns)
+    d = disparity[1:-1, 1:-1]
+    u = jnp.broadcast_to(image.u, shape)
+    # Slopes and edges.
+    left, right, up, down = disparity[1:-1, :-2], disparity[1:-1, 2:], disparity[:-2, 1:-1], disparity[2:, 1:-1]
+    to_left, to_right, to_up, to_down = left - d, right - d, up - d, down - d
+    across = jnp.minimum(jnp.abs(to_left), jnp.abs(to_right)) * (1 / image.stride[0])
+    along = jnp.minimum(jnp.abs(to_up), jnp.abs(to_down)) * (1 / image.stride[1])
+    bend_across, bend_along = jnp.abs(to_left + to_right), jnp.abs(to_up + to_down)
+    edge = jnp.maximum(bend_across, bend_along) > noise.edge_jump
+    grazing = jnp.maximum(across, along) > noise.grazing_slope
+    # What can be matched at all.
+    hidden = hidden_from_right(disparity, image)
+    near = d > camera.max_disparity
+    # Its noise.
+    counters = np.arange(4 * image.rows * image.columns, dtype=np.uint32).reshape(4, *shape)
+    match_seed = hashing.fold(seed, MATCH)
+    chance = hashing.bits(match_seed, counters[0])
+    dropped = half(chance) < jnp.where(grazing, noise.drop_grazing, jnp.where(edge, noise.drop_edge, noise.drop_plain))
+    swapped = edge & (half(chance >> np.uint32(16)) < noise.edge_swap)
+    beyond_across = jnp.where(jnp.abs(to_left) > jnp.abs(to_right), to_left, to_right)
+    beyond_along = jnp.where(jnp.abs(to_up) > jnp.abs(to_down), to_up, to_down)
+    beyond = jnp.where(bend_across > bend_along, beyond_across, beyond_along)
+    error = noise.bias + noise.sd * (1 + noise.slope_gain * across) * correlated(match_seed, image, noise.correlation)
+    measured = d + jnp.where(swapped, beyond, 0.0) + error
+    # Phantoms: one chance and one wild disparity for each clump.
+    clump = hashing.bits(hashing.fold(seed, PHANTOM), clumps(image))
+    wild = 1 + half(clump) * (camera.max_disparity - 1)
+    share = jnp.where(near, noise.phantom_near, jnp.where(hidden, noise.phantom_hidden, 0.0))
+    phantom = half(clump >> np.uint32(16)) < share
+    measured = jnp.where(phantom, wild, measured)
+    steps = jnp.where(noise.quantum > 0, 1 / noise.quantum, 0.0)
+    measured = jnp.where(noise.quantum > 0, jnp.round(measured * steps) * noise.quantum, measured)
+    matched = phantom | ~(hidden | near | dropped)
+    in_reach = (measured > 0) & (measured <= camera.max_disparity) & (measured <= u)
+    return jnp.where(matched & in_reach & textured & (d > 0), measured, 0.0)
+
+
+def hidden_from_right(
+    disparity: Float[Array, "padded_rows padded_columns"], image: ImageSpec
+) -> Bool[Array, "rows columns"]:
+    """Whether a nearer surface to the right of a pixel covers it in the right image.
+
+    A pixel of column u is seen there at u - d. It is covered when a pixel further to the right is seen there or
+    left of there.
+    """
+    window = 1
+    seen_at = image.u - disparity[1:-1, 1:-1]
+    least = jnp.pad(seen_at[:, 1:], ((0, 0), (0, 1)), constant_values=np.inf)
+    while window * image.stride[0] < HIDING_REACH:  # the least of the next 1, 2, 4, ... columns
+        further = jnp.pad(least[:, window:], ((0, 0), (0, window)), constant_values=np.inf)
+        least, window = jnp.minimum(least, further), 2 * window
+    return least <= seen_at
+
+
+def correlated(
+    seed: UInt32[Array, ""], image: ImageSpec, correlation: Float[Array, ""]
+) -> Float[Array, "rows columns"]:
+    """Normal noise in which neighbours across and down are correlated, diagonal ones by the square of that.
+
+    A moving average of two, across and then down: white + c * next has a correlation of c / (1 + c^2).
+    """
+    r = jnp.maximum(correlation, 1e-6)
+    c = (1 - jnp.sqrt(jnp.maximum(1 - 4 * r * r, 0.0))) / (2 * r)
+    shape = (image.rows + 1, image.columns + 1)
+    white = hashing.normal(seed, np.arange(shape[0] * shape[1], dtype=np.uint32).reshape(shape), 1)
+    mixed = white[:, :-1] + c * white[:, 1:]
+    return (mixed[:-1] + c * mixed[1:]) / (1 + c * c)
+
+
+def clumps(image: ImageSpec) -> UInt32[np.ndarray, "rows columns"]:
+    """Number of the phantom block that each ray lies in."""
+    across = image.width // PHANTOM_BLOCK + 1
+    return ((image.v // PHANTOM_BLOCK)[:, None] * across + (image.u // PHANTOM_BLOCK)[None, :]).astype(np.uint32)
+
+
+def half(bits: UInt32[Array, "*s"]) -> Float[Array, "*s"]:
+    """The lower 16 bits as a number in [0, 1)."""
+    return (bits & np.uint32(0xFFFF)).astype(jnp.int32).astype(jnp.float32) * np.float32(2**-16)

@@ -1,0 +1,86 @@
+"""The ray-cast stereo camera: true depth of boxes and floor, made into what a stereo matcher would have measured."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int32, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.geometry.rays import cast_boxes, cast_floor, key, marked, nearness
+from jaxbiped.sensing import noise as stereo
+from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, mount, placed, rays
+from jaxbiped.sensing.noise import StereoNoise
+from jaxbiped.sensing.view import View
+
+
+def measure(
+    arena: Arena,
+    pose: Pose,
+    camera: Camera,
+    noise: StereoNoise,
+    image: ImageSpec,
+    seed: UInt32[Array, ""],
+    look: Bool[Array, ""] | bool = False,
+    squat: Bool[Array, ""] | bool = False,
+) -> View:
+    """One measurement in one arena from the true `pose` (z: height of the supporting surface).
+
+    The robot's true attitude is off by a roll and a pitch that the view's seed draws; points are reprojected as if it
+    were upright (`View`). `look` tilts the camera to the feet, `squat` lowers it. Rays that measured nothing, or a
+    range beyond `noise.max_range`, have weight 0 and lie at the origin; so do all when the pose is not finite.
+    """
+    at = mount(camera, look, squat)
+    textured = arena.boxes.contrast >= noise.min_contrast, arena.floor_contrast >= noise.min_contrast
+    keys = cast(arena, pose, camera, at, image, *stereo.attitude_error(noise, seed), *textured)
+    disparity = nearness(keys) * (camera.focal * camera.baseline)
+    disparity = stereo.match(disparity, marked(keys)[1:-1, 1:-1], camera, image, noise, seed)
+    return reproject(disparity, camera, at, image, noise.max_range)
+
+
+def cast(
+    arena: Arena,
+    pose: Pose,
+    camera: Camera,
+    at: Mount,
+    image: ImageSpec,
+    roll: Float[Array, ""],
+    pitch: Float[Array, ""],
+    box_marks: Bool[Array, "M"],
+    floor_mark: Bool[Array, ""],
+) -> Int32[Array, "padded_rows padded_columns"]:
+    """What each ray, and each of a margin of one around, meets: inverse depth [1/m] and a mark (`geometry.rays.key`).
+
+    Inverse depth is along the optical axis, and 0 where a ray leaves the arena: there is nothing beyond its rectangle.
+    """
+    origin, basis = placed(pose, at, roll, pitch)
+    x, y = (values.reshape(-1) / camera.focal for values in np.meshgrid(*margin(image)))
+    floor = key(cast_floor(arena.size_xy, origin, basis, x, y), floor_mark)
+    keys = cast_boxes(arena.boxes, box_marks, origin, basis, x, y, floor)
+    return keys.reshape(image.rows + 2, image.columns + 2)
+
+
+def margin(image: ImageSpec) -> tuple[Float[np.ndarray, "padded_columns"], Float[np.ndarray, "padded_rows"]]:
+    """[px] columns and rows of the rays from the principal point, with one more on each side."""
+    return tuple(
+        np.concatenate([values[:1] - step, values, values[-1:] + step]).astype(np.float32) - np.float32(middle)
+        for values, step, middle in zip((image.u, image.v), image.stride, image.centre, strict=True)
+    )
+
+
+def reproject(
+    disparity: Float[Array, "rows columns"],
+    camera: Camera,
+    at: Mount,
+    image: ImageSpec,
+    max_range: Float[Array, ""] | float,
+) -> View:
+    """Points in the robot frame of disparities [px] (0: not measured), for a robot that stands upright."""
+    # All from the quotient, in flat vectors: XLA then keeps it, and neither matches again nor shuffles for each result.
+    depth = (camera.focal * camera.baseline / disparity).reshape(-1)
+    x, y = (values.reshape(-1) for values in jnp.meshgrid(*rays(camera, image)))
+    valid = depth * jnp.sqrt(1 + x * x + y * y) <= max_range  # false for the inf and NaN of what was not measured
+    cos, sin = jnp.cos(at.pitch), jnp.sin(at.pitch)
+    points = (at.forward + depth * (cos - sin * y), -depth * x, at.height - depth * (sin + cos * y))
+    return View(*(jnp.where(valid, axis, 0.0) for axis in points), weight=jnp.where(valid, image.pixels_per_ray, 0.0))
