@@ -16,8 +16,10 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind, World
 from jaxbiped.motion.primitives import Command
-from jaxbiped.sensing import Sightings, View, measure_oracle, measure_raycast, predict, sight_landmarks
+from jaxbiped.sensing import landmarks, oracle, raycast
 from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.localisation import predict
+from jaxbiped.sensing.view import Sightings, View
 
 SENSE = 1  # channel of a mission's seed
 
@@ -46,12 +48,12 @@ def sense(world: World, mind: Mind, arena: Arena, settings: Settings, program: P
     """What one robot measures from where it really stands."""
     seed = fold(world.seed, SENSE, world.decisions)
     if program.sensor == "oracle":
-        view = measure_oracle(arena, world.pose, (program.spec.size_x, program.spec.size_y))
+        view = oracle.measure(arena, world.pose, (program.spec.size_x, program.spec.size_y))
     else:
-        view = measure_raycast(
+        view = raycast.measure(
             arena, world.pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat
         )
-    return view, sight_landmarks(
+    return view, landmarks.sight(
         arena, world.pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
     )
 

@@ -20,7 +20,8 @@ from jaxbiped.mission.settings import Settings
 from jaxbiped.mission.state import Mind
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
-from jaxbiped.sensing import Sightings, View, correct
+from jaxbiped.sensing.localisation import correct
+from jaxbiped.sensing.view import Sightings, View
 
 LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is known
 TRIES = 4  # measurements in a row without a path that end the mission: once around

@@ -19,8 +19,8 @@ from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.mission.settings import Settings
 from jaxbiped.mission.state import World
 from jaxbiped.motion.primitives import Command, duration
-from jaxbiped.sensing import drift
 from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.odometry import drift
 
 CHECKS = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
 TOUCH = 0.002  # [m] contact that counts as none: rounding, and boxes that just end at a height
@@ -33,8 +33,8 @@ class Execution:
     """What came of one command."""
 
     pose: Pose  # true, after it
-    moved: tuple[Float[Array, "*B"], Float[Array, "*B"], Float[Array, "*B"]]  # odometry: dx, dy [m], dyaw [rad]
-    variances: Float[Array, "*B 3"]  # of the odometry
+    moved: Float[Array, "*B 3"]  # dx, dy [m], dyaw [rad] by odometry, in the robot frame before it
+    variances: Float[Array, "*B 3"]  # of that
     time: Float[Array, "*B"]  # [s]
     distance: Float[Array, "*B"]  # [m]
     collided: Bool[Array, "*B"]
@@ -79,7 +79,7 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
     outside = (x < 0) | (x > arena.size_xy[0]) | (y < 0) | (y > arena.size_xy[1])
 
     seed = fold(world.seed, ODOMETRY, world.decisions)
-    moved, variances = drift((dx, dy, command.turn), settings.odometry, seed)
+    moved, variances = drift(jnp.stack([dx, dy, command.turn]), settings.odometry, seed)
     return Execution(
         pose=Pose(x, y, z, yaw),
         moved=moved,

@@ -27,6 +27,7 @@ class OraclePlan:
 
     reachable: Bool[Array, "P A"]
     cost: Float[Array, "P A"]  # of Eq. (1), from the start's cell to the goal's; inf where there is no path
+    length: Float[Array, "P A"]  # [m] of that path, from cell centre to cell centre
 
 
 @partial(jax.jit, static_argnames=("program",))
@@ -41,7 +42,9 @@ def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePl
     heading = jax.vmap(nearest_direction)(arenas.start_xyyaw[:, 2])
     row = jnp.arange(start_ij.shape[0])
 
-    def plan(setting: Settings) -> Float[Array, "A"]:
+    moves = jnp.asarray(planning.DIRECTIONS)
+
+    def plan(setting: Settings) -> tuple[Float[Array, "A"], Float[Array, "A"]]:
         classes, levels = jax.vmap(truth_grid, in_axes=(0, None, None))(arenas, spec, setting.body)
         costs, rules = setting.costs.at_pitch(spec.pitch), setting.strategy.rules()
         floor, flat = jnp.full_like(classes, Cell.FLOOR), jnp.zeros_like(levels)
@@ -49,19 +52,17 @@ def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePl
         grid, ground = jnp.where(blind, floor, classes), jnp.where(blind, flat, levels)
         to_go = planning.field(grid, ground, costs, rules, goal_ij).cost
         cost = to_go[row, start_ij[:, 0], start_ij[:, 1]]
-        moves = planning.next_step(to_go, grid, ground, costs, rules, start_ij, heading, length=max(spec.shape))
-        free = way_is_floor(start_ij, moves, classes)
-        return jnp.where(blind & ~free, jnp.inf, cost)
+        path = planning.next_step(to_go, grid, ground, costs, rules, start_ij, heading, length=3 * sum(spec.shape))
+        steps = jnp.where((path >= 0)[..., None], moves[jnp.maximum(path, 0)], 0)
+        free = way_is_floor(start_ij + jnp.cumsum(steps, axis=1).swapaxes(0, 1), classes)
+        length = spec.pitch * jnp.sum(jnp.hypot(steps[..., 0], steps[..., 1]), axis=1)
+        return jnp.where(blind & ~free, jnp.inf, cost), length
 
-    cost = jax.lax.map(plan, settings)
-    return OraclePlan(jnp.isfinite(cost), cost)
+    cost, length = jax.lax.map(plan, settings)
+    return OraclePlan(jnp.isfinite(cost), cost, length)
 
 
-def way_is_floor(
-    start_ij: Int[Array, "A 2"], moves: Int[Array, "A L"], classes: Int[Array, "A H W"]
-) -> Bool[Array, "A"]:
-    """Whether every cell that the moves enter is floor."""
-    steps = jnp.where((moves >= 0)[..., None], jnp.asarray(planning.DIRECTIONS)[jnp.maximum(moves, 0)], 0)
-    cells = start_ij[:, None] + jnp.cumsum(steps, axis=1)
-    row = jnp.arange(start_ij.shape[0])[:, None]
-    return jnp.all(classes[row, cells[..., 0], cells[..., 1]] == Cell.FLOOR, axis=1)
+def way_is_floor(cells_ij: Int[Array, "L A 2"], classes: Int[Array, "A H W"]) -> Bool[Array, "A"]:
+    """Whether every cell of each way is floor."""
+    row = jnp.arange(classes.shape[0])
+    return jnp.all(classes[row, cells_ij[..., 0], cells_ij[..., 1]] == Cell.FLOOR, axis=0)

@@ -63,33 +63,48 @@ class Queue:
     result: Result
 
 
-def run(
-    arenas: Arena,
-    settings: Settings,
-    jobs: Jobs,
-    program: Program,
-    slots: int = SLOTS,
-    on_progress: Callable[[int], None] | None = None,
-) -> Result:
-    """Work the queue off.
+Work = Callable[[Arena, Settings, Jobs, Callable[[int], None]], Result]
+
+
+def compile_queue(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int = SLOTS) -> Work:
+    """The compiled driver for arguments of these shapes.
 
     Args:
       arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
-      program: static. One compilation for each (program, slots, A, P, N).
+      program: static. One compilation for each (program, slots, A, P, N), which later calls share.
       slots: static.
-      on_progress: called on the host with the number of jobs that have ended, every `TURNS` decisions.
 
     Returns:
-      Results in the order of the jobs; padding stays RUNNING.
+      A function of (arenas, settings, jobs, on_progress) that works the queue off and gives results in the order of
+      the jobs; padding stays RUNNING. It may be called by several threads at once. `on_progress` is called on the
+      host with the number of jobs that have ended, every `TURNS` decisions.
     """
-    queue = fill(arenas, settings, jobs, program, slots)
-    while True:
-        queue = segment(queue, arenas, settings, jobs, program)
-        ended, idle = jax.device_get((jnp.sum(queue.result.code != Code.RUNNING), jnp.all(queue.job >= jobs.count)))
-        if on_progress:
-            on_progress(int(ended))
-        if idle:
-            return queue.result
+    signature = (program, slots, jax.tree.structure((arenas, settings, jobs)), *shapes((arenas, settings, jobs)))
+    if signature not in COMPILED:
+        filled = fill.lower(arenas, settings, jobs, program, slots)
+        queue = jax.eval_shape(partial(fill, program=program, slots=slots), arenas, settings, jobs)
+        turned = segment.lower(queue, arenas, settings, jobs, program)
+        COMPILED[signature] = filled.compile(), turned.compile()
+    first, further = COMPILED[signature]
+
+    def work(arenas: Arena, settings: Settings, jobs: Jobs, on_progress: Callable[[int], None]) -> Result:
+        queue = first(arenas, settings, jobs)
+        while True:
+            queue = further(queue, arenas, settings, jobs)
+            code, job = jax.device_get((queue.result.code, queue.job))
+            on_progress(int(np.sum(code != Code.RUNNING)))
+            if np.all(job >= jobs.count):
+                return queue.result
+
+    return work
+
+
+COMPILED: dict = {}
+
+
+def shapes(tree) -> list:
+    """Shape and type of each leaf."""
+    return [(leaf.shape, str(leaf.dtype)) for leaf in jax.tree.leaves(tree)]
 
 
 @partial(jax.jit, static_argnames=("program", "slots"))

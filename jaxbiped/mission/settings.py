@@ -16,17 +16,10 @@ from jaxbiped.mission.strategies import Strategy, strategy
 from jaxbiped.motion.primitives import DurationConfig, Durations
 from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.planning import Costs
-from jaxbiped.sensing import (
-    Camera,
-    CameraConfig,
-    ImageSpec,
-    LandmarkConfig,
-    LandmarkNoise,
-    NoiseConfig,
-    OdometryConfig,
-    OdometryNoise,
-    StereoNoise,
-)
+from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
+from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
+from jaxbiped.sensing.noise import NoiseConfig, StereoNoise
+from jaxbiped.sensing.odometry import OdometryConfig, OdometryNoise
 
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e6)]
 

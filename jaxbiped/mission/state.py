@@ -14,7 +14,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import GridMap, GridSpec, empty
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Settings
-from jaxbiped.sensing import Belief
+from jaxbiped.sensing.localisation import Belief
 
 
 @jax.tree_util.register_dataclass
