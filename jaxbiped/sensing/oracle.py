@@ -1,0 +1,73 @@
+"""The oracle: noise-free points of the whole true arena, seen and unseen. For tests, and as an upper bound."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.boxes import Boxes, covers
+from jaxbiped.geometry.pose import Pose, to_robot
+from jaxbiped.sensing.view import View
+
+
+def measure(
+    arena: Arena,
+    pose: Pose,
+    size_xy: tuple[float, float],
+    spacing: float = 0.025,
+    level_height: float = 0.03,
+    levels: int = 15,
+    weight: float = 16.0,
+) -> View:
+    """Points of one whole arena in the robot frame of the true `pose`; all arguments after it are static.
+
+    On a lattice of `spacing` [m] over the area `size_xy` [m] there is in each column one point on the ground, and one
+    in each level that a box fills at least in part. Columns are centres of squares, so that none lies on the edge of
+    a cell of a pitch that `spacing` divides.
+
+    Args:
+      level_height: [m] between the points inside boxes; level l is about l times that.
+      levels: 0 to levels - 1; boxes above (higher than any head) have no points there.
+      weight: [px] of each point.
+
+    Returns:
+      `columns * (1 + levels)` points; weight 0 where a level is empty, and everywhere when the pose is not finite.
+    """
+    axes = ((np.arange(round(size / spacing), dtype=np.float32) + 0.5) * np.float32(spacing) for size in size_xy)
+    x, y = (jnp.asarray(values.reshape(-1)) for values in np.meshgrid(*axes))
+    ground, ceiling, cover = heights(arena.boxes, x, y)
+    level = (np.arange(levels, dtype=np.float32) * np.float32(level_height))[:, None]
+    half = level_height / 2
+    inside_floor = level < ground  # the ground itself has a point of its own
+    inside_overhead = (level + half > ceiling) & (level - half <= cover)
+    # A level that a box fills in part is measured where the box begins or ends.
+    height = jnp.where(inside_floor, level, jnp.clip(level, ceiling, jnp.maximum(ceiling, cover)))
+    z = jnp.concatenate([ground[None], height]) - pose.z
+    there = jnp.concatenate([jnp.ones_like(ground[None], bool), inside_floor | inside_overhead])
+    forward, left = to_robot(pose, x, y)
+    there = there & jnp.isfinite(forward + left + z)
+    points = (jnp.where(there, axis, 0.0).reshape(-1) for axis in (forward[None], left[None], z))
+    return View(*points, weight=jnp.where(there, weight, 0.0).reshape(-1))
+
+
+def heights(
+    boxes: Boxes, x: Float[Array, "N"], y: Float[Array, "N"]
+) -> tuple[Float[Array, "N"], Float[Array, "N"], Float[Array, "N"]]:
+    """Height [m] of the ground (else 0), and lowest bottom (else inf) and highest top (else -inf) of what hangs there.
+
+    Ground and ceiling are those of `geometry.boxes`; as a loop, since XLA would search the boxes again for each level.
+    """
+
+    def include(found, box):
+        ground, ceiling, cover = found
+        here, overhead = covers(box, 0, x, y), box.overhead[0]
+        ground = jnp.where(here & ~overhead, jnp.maximum(ground, box.top[0]), ground)
+        ceiling = jnp.where(here & overhead, jnp.minimum(ceiling, box.bottom[0]), ceiling)
+        cover = jnp.where(here & overhead, jnp.maximum(cover, box.top[0]), cover)
+        return (ground, ceiling, cover), None
+
+    nothing = (jnp.zeros_like(x), jnp.full_like(x, jnp.inf), jnp.full_like(x, -jnp.inf))
+    return jax.lax.scan(include, nothing, jax.tree.map(lambda leaf: leaf[:, None], boxes))[0]  # slots of one

@@ -1,0 +1,40 @@
+"""How well the camera measures, by name: `ideal`, `rendered` (pairs rendered and matched), `real`.
+
+They live here so that an installed wheel has them; `configs/sensors/` has the same values with an explanation of each.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from jaxbiped import config
+from jaxbiped.config import Model
+from jaxbiped.errors import InputError
+from jaxbiped.sensing import landmarks, noise
+from jaxbiped.sensing.landmarks import LandmarkConfig
+from jaxbiped.sensing.noise import NoiseConfig
+
+
+class SensorConfig(Model):
+    """A sensor file: noise of the points and of the landmarks."""
+
+    stereo: NoiseConfig = noise.RENDERED
+    """Of stereo matching."""
+    landmarks: LandmarkConfig = landmarks.RENDERED
+    """Of finding landmarks."""
+
+
+PRESETS = {
+    "ideal": SensorConfig(stereo=noise.IDEAL, landmarks=landmarks.IDEAL),
+    "rendered": SensorConfig(stereo=noise.RENDERED, landmarks=landmarks.RENDERED),
+    "real": SensorConfig(stereo=noise.REAL, landmarks=landmarks.REAL),
+}
+
+
+def sensor_preset(name: str) -> SensorConfig:
+    """The preset of this name, or the sensor file of this path; raises `InputError` when it is neither."""
+    if name in PRESETS:
+        return PRESETS[name]
+    if Path(name).suffix != ".toml":
+        raise InputError(f"must be one of {', '.join(PRESETS)} or a .toml file", field="sensor", value=name)
+    return config.load(SensorConfig, name)
