@@ -6,11 +6,12 @@ growing the obstacles by the robot's radius is an OR of shifted masks, and readi
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, UInt32
+from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.mapping.grid import Body, Cell, GridSpec
 from jaxbiped.mapping.params import MapParams
@@ -21,10 +22,10 @@ def c_obstacles(
 ) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
     """Classes (int8, `Cell`) and ground levels (int8) of all cells of one arena, from its evidence [pixels].
 
-    A voxel is occupied when it holds `voxel_points` and a share of `voxel_share` of the voxels right above and
-    below it, out of which noise may leak. A column's ground is its supporting surface (`ground_level`). A cell is then,
+    A column's ground is its supporting surface (`ground_level`), read off the occupied voxels (`occupied_levels`); what
+    stands in the way are the solid ones (`solid_levels`). A cell is then,
     in this order,
-    - obstacle, when something occupied within the body's radius stands more than one step above this cell's own ground
+    - obstacle, when something solid within the body's radius stands more than one step above this cell's own ground
       and below the squatting head;
     - gate, when so below the standing head;
     - bump, when its ground is above level 0;
@@ -33,17 +34,49 @@ def c_obstacles(
     `classify`'s to say. Beyond the rim of the grid nothing is occupied.
     """
     columns = occupied_levels(evidence, params, spec)
-    return read_cells(columns, ground_level(columns, evidence, spec), body, params.head_margin, spec)
+    ground = ground_level(columns, evidence, spec)
+    return read_cells(solid_levels(columns, evidence, params, spec), ground, body, params.head_margin, spec)
 
 
 def occupied_levels(evidence: Float[Array, "H W Z"], params: MapParams, spec: GridSpec) -> UInt32[Array, "H W"]:
-    """Masks of the occupied levels of each column; a voxel below level 0 counts as the base floor, level 0."""
+    """Masks of the occupied levels of each column; a voxel below level 0 counts as the base floor, level 0.
+
+    A voxel is occupied when it holds `params.voxel_points`, and a share of `params.voxel_share` of the voxels right
+    above and below it, out of which noise may leak.
+    """
     above = jnp.pad(evidence[..., 1:], ((0, 0), (0, 0), (0, 1)))
     below = jnp.pad(evidence[..., :-1], ((0, 0), (0, 0), (1, 0)))
     least = jnp.maximum(params.voxel_points * spec.cell_share, params.voxel_share * jnp.maximum(above, below))
+    return pack((evidence > 0) & (evidence >= least), spec)
+
+
+def solid_levels(
+    columns: UInt32[Array, "H W"], evidence: Float[Array, "H W Z"], params: MapParams, spec: GridSpec
+) -> UInt32[Array, "H W"]:
+    """Those of the occupied levels (`columns`) that are no phantoms.
+
+    A stereo matcher's phantoms are single clumps of few pixels. So a solid voxel has `params.solid_points` within the
+    patch of about 5 x 5 cm around it (at least its own cell) and another such voxel among its 26 neighbours.
+    """
+    height, width = columns.shape
+    aside = int(0.025 / spec.pitch + 1e-6)  # cells on each side that make up the patch
+    if aside:
+        padded = jnp.pad(evidence, ((aside, aside), (aside, aside), (0, 0)))
+        rows = sum(padded[i : i + height] for i in range(2 * aside + 1))
+        evidence = sum(rows[:, j : j + width] for j in range(2 * aside + 1))
+    dense = columns & pack(evidence >= params.solid_points, spec)
+    others = dense << 1 | dense >> 1
+    around = jnp.pad(dense | others, 1)
+    for i, j in itertools.product(range(3), range(3)):
+        if (i, j) != (1, 1):
+            others = others | around[i : i + height, j : j + width]
+    return dense & others
+
+
+def pack(voxels: Bool[Array, "H W Z"], spec: GridSpec) -> UInt32[Array, "H W"]:
+    """Columns of voxels as masks of levels; what lies below level 0 is level 0."""
     bits = jnp.uint32(1) << jnp.maximum(jnp.arange(spec.levels) + spec.lowest, 0).astype(jnp.uint32)
-    occupied = jnp.where((evidence > 0) & (evidence >= least), bits, 0)
-    return jax.lax.reduce(occupied, jnp.uint32(0), jax.lax.bitwise_or, (2,))
+    return jax.lax.reduce(jnp.where(voxels, bits, 0), jnp.uint32(0), jax.lax.bitwise_or, (2,))
 
 
 def ground_level(columns: UInt32[Array, "H W"], evidence: Float[Array, "H W Z"], spec: GridSpec) -> Int[Array, "H W"]:
@@ -62,14 +95,14 @@ def ground_level(columns: UInt32[Array, "H W"], evidence: Float[Array, "H W Z"],
 
 
 def read_cells(
-    columns: UInt32[Array, "H W"],
+    solid: UInt32[Array, "H W"],
     ground: Int[Array, "H W"],
     body: Body,
     head_margin: Float[Array, ""] | float,
     spec: GridSpec,
 ) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
-    """Classes (int8) and levels (int8) from masks of occupied levels and from the ground level of each cell."""
-    near = dilate(columns, body.radius, spec)
+    """Classes (int8) and levels (int8) from masks of solid levels and from the ground level of each cell."""
+    near = dilate(solid, body.radius, spec)
     lower_face = (jnp.arange(32) - 0.5) * spec.level_height
     above_step = lower_face >= body.step
     squatting = near & band(above_step & (lower_face + head_margin < body.squatting), ground)

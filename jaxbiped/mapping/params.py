@@ -16,7 +16,7 @@ class MapConfig(Model):
     """Thresholds of the map, with the values found necessary on rendered stereo pairs.
 
     A number of points is one of pixels of a 512 x 384 image that fall on a cell of 5 x 5 cm; on another pitch it
-    scales with the cell's area.
+    scales with the cell's area (but `solid_points` belong to a patch of fixed size).
     """
 
     max_range: float = Field(2.0, gt=0)
@@ -25,6 +25,8 @@ class MapConfig(Model):
     """a voxel with fewer points is empty, in one view and in the fused evidence"""
     voxel_share: float = Field(0.05, ge=0, lt=1)
     """a voxel with a smaller share of the points of one right above or below is empty: noise leaked out of that one"""
+    solid_points: float = Field(150.0, ge=0)
+    """a patch of 5 x 5 cm of one level with fewer points bars no way: it may be a phantom, a clump of wild disparity"""
     view_points: float = Field(5.0, ge=0)
     """a cell with fewer points in one view gets no vote from it"""
     fused_points: float = Field(10.0, gt=0)
@@ -53,6 +55,7 @@ class MapParams:
     max_range: Float[Array, ""]
     voxel_points: Float[Array, ""]
     voxel_share: Float[Array, ""]
+    solid_points: Float[Array, ""]
     view_points: Float[Array, ""]
     fused_points: Float[Array, ""]
     head_margin: Float[Array, ""]

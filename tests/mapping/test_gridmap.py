@@ -83,7 +83,7 @@ def test_lintels(clearance, expected):
 
 def test_a_near_view_does_not_outvote_the_lintel_that_it_cannot_see():
     grid_map = empty(SPEC)
-    for points, weight in ((np.concatenate(gate(0.37)), 4.0), (FLOOR, 100.0)):
+    for points, weight in ((np.concatenate(gate(0.37)), 8.0), (FLOOR, 400.0)):
         grid_map = LOOK(grid_map, view(points, weight), ORIGIN, BODY, PARAMS, spec=SPEC, refit=False)
     classes, _ = READ(grid_map, PARAMS, spec=SPEC)
     assert (np.asarray(classes)[cells((0.85, 1.0), (0.35, 0.65))] == Cell.GATE).all()

@@ -66,7 +66,29 @@ def c_obstacles(evidence, body, params, spec):
     voxels = (evidence > 0) & (evidence >= least)
     occupied = voxels[..., -spec.lowest :].copy()  # by level, from 0
     occupied[..., 0] = voxels[..., : 1 - spec.lowest].any(-1)
-    return read_cells(occupied, ground_level(occupied, evidence, spec), body, params.head_margin, spec)
+    ground = ground_level(occupied, evidence, spec)
+    return read_cells(solid_levels(voxels, evidence, params, spec), ground, body, params.head_margin, spec)
+
+
+def solid_levels(voxels, evidence, params, spec):
+    """Occupied voxels with enough points in the patch around them, and with such a neighbour."""
+    height, width = voxels.shape[:2]
+    aside = 0
+    while (2 * (aside + 1)) * spec.pitch <= 0.05 + 1e-9:
+        aside += 1
+    padded = np.pad(evidence, ((aside, aside), (aside, aside), (0, 0)))
+    sides = range(2 * aside + 1)
+    patch = sum(padded[i : i + height, j : j + width] for i in sides for j in sides)
+    dense = (voxels & (patch >= params.solid_points))[..., -spec.lowest :]
+    dense[..., 0] |= (voxels & (patch >= params.solid_points))[..., : 1 - spec.lowest].any(-1)
+    padded = np.pad(dense, 1)
+    around = sum(
+        padded[i : i + height, j : j + width, k : k + dense.shape[-1]].astype(int)
+        for i in range(3)
+        for j in range(3)
+        for k in range(3)
+    )
+    return dense & (around > 1)  # itself and another
 
 
 def ground_level(occupied, evidence, spec):
