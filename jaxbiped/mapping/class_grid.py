@@ -44,18 +44,18 @@ class ClassGrid:
         (x, y), (rows, columns) = self.origin_xy, self.shape
         return float(x), float(x + columns * self.pitch), float(y), float(y + rows * self.pitch)
 
-    def cell_at(self, xy: tuple[float, float], field: str = "xy") -> tuple[int, int]:
+    def cell_at(self, xy: tuple[float, float], field: str = "xy", file: Path | None = None) -> tuple[int, int]:
         """Row and column (i, j) of the cell that holds the point `xy` [m].
 
         A cell holds its lower borders and not its upper ones; so does the map.
 
         Raises:
-          InputError: the point is outside the map, or not a number; `field` names it.
+          InputError: the point is outside the map, or not a number; `field` and `file` name it.
         """
         x0, x1, y0, y1 = self.extent
         if not (x0 <= xy[0] < x1 and y0 <= xy[1] < y1):
             allowed = f"must lie on the map, x in [{x0:g}, {x1:g}) m and y in [{y0:g}, {y1:g}) m"
-            raise InputError(allowed, field=field, value=tuple(map(float, xy)))
+            raise InputError(allowed, file=file, field=field, value=tuple(map(float, xy)))
         j, i = (int(steps) for steps in np.floor((np.asarray(xy, float) - self.origin_xy) / self.pitch))
         return min(i, self.shape[0] - 1), min(j, self.shape[1] - 1)  # rounding may lift a point by one ulp
 

@@ -46,12 +46,12 @@ class Scenario:
     tolerance: Float64[np.ndarray, "Q"]  # [cells] how far `optimal` may be from the exact length, by its digits
 
 
-def load_map(path: str | Path, pitch: float = 1.0) -> ClassGrid:
+def load_map(path: str | Path, pitch: float = 0.05) -> ClassGrid:
     """Read a `.map` of type octile as floor and obstacles, all on level 0.
 
     Args:
       path: the file.
-      pitch: [m] side of a cell, above 0; the file does not say.
+      pitch: [m] side of a cell, above 0; the file does not say, so that a cell is a step of the robot by default.
 
     Raises:
       InputError: no such file, another type, a bad header, a row or column missing or in excess, an unknown

@@ -34,8 +34,8 @@ def test_characters_rows_and_columns(write):
     grid = moving_ai.load_map(write(MAP))
     F, X = Cell.FLOOR, Cell.OBSTACLE
     np.testing.assert_array_equal(grid.classes, [[F, F, F, X, X, X, X], [F] * 7])
-    assert (grid.levels == 0).all() and grid.pitch == 1.0 and (grid.origin_xy == 0).all()
-    assert moving_ai.load_map(write(MAP), 0.05).pitch == 0.05
+    assert (grid.levels == 0).all() and grid.pitch == 0.05 and (grid.origin_xy == 0).all()
+    assert moving_ai.load_map(write(MAP), 1.0).pitch == 1.0
 
 
 def test_windows_line_ends_and_trailing_empty_lines_are_fine(write):

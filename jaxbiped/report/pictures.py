@@ -1,0 +1,231 @@
+"""Pictures of maps in the paper's colours: grey floor, blue bump, red obstacle, purple gate, white unmeasured."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib.patches as patches
+import matplotlib.patheffects as effects
+import numpy as np
+from jaxtyping import Float, Int8, UInt8
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from jaxbiped.files import write_whole
+from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.mission.log import Mark, MissionLog, Outline
+
+COLOURS = {
+    Cell.UNMEASURED: "#ffffff",
+    Cell.FLOOR: "#cfcfcf",
+    Cell.BUMP: "#7db1e6",
+    Cell.GATE: "#b186d3",
+    Cell.OBSTACLE: "#d9534f",
+}
+BUMP_SHADES = ("#7db1e6", "#4a8ad4", "#2763ab")  # one step from the base floor, two, more
+PLAN, TRACK, INK = "#118a2e", "#222222", "#333333"
+OUTLINES = {"obstacle": "#8e1f1c", "bump": "#163f75", "gate": "#5b2a86"}
+GOAL_RADIUS = 0.10  # [m] "reached" (paper, 3.1)
+DISC_RADIUS, SQUARE_SIDE = 0.075, 0.05  # [m] landmarks (paper, 3.1)
+MOST_CELLS_LINED = 6000  # beyond, cells are too small for lines around them and numbers in them
+MOST_ARROWS = 150  # beyond, a plan is a line
+
+
+@dataclass(frozen=True)
+class Axis:
+    """How metres are shown: in which unit, and whether y points down the page."""
+
+    unit: str = "cm"
+    per_metre: float = 100.0
+    y_down: bool = False
+
+
+CENTIMETRES, METRES = Axis(), Axis("m", 1.0)
+
+
+def class_image(classes: Int8[np.ndarray, "H W"], levels: Int8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
+    """The map as RGB; bumps darken with their distance from level 0."""
+    palette = np.array([to_rgb(COLOURS[cell]) for cell in Cell])
+    image = palette[classes]
+    shades = np.array([to_rgb(shade) for shade in BUMP_SHADES])
+    bump = classes == Cell.BUMP
+    image[bump] = shades[np.clip(np.abs(levels[bump].astype(int)) - 1, 0, len(shades) - 1)]
+    return np.round(image * 255).astype(np.uint8)
+
+
+def draw_map(
+    ax: Axes,
+    grid: ClassGrid,
+    *,
+    plan_xy: Float[np.ndarray, "n 2"] | None = None,
+    track_xy: Float[np.ndarray, "m 2"] | None = None,
+    start_xy: tuple[float, float] | None = None,
+    goal_xy: tuple[float, float] | None = None,
+    goal_radius: float | None = GOAL_RADIUS,
+    outlines: tuple[Outline, ...] = (),
+    landmarks: tuple[Mark, ...] = (),
+    axis: Axis = CENTIMETRES,
+) -> None:
+    """Draw a map and what happens on it into `ax`.
+
+    Args:
+      ax: the axes to draw into.
+      grid: the map.
+      plan_xy: [m] the path to go: arrows from point to point, a line when there are many.
+      track_xy: [m] the path walked.
+      start_xy, goal_xy: [m] a ring, and a cross with a broken circle of `goal_radius` [m] (None: no circle).
+      outlines, landmarks: the truth that the map is about.
+      axis: the unit of the axes.
+    """
+    k = axis.per_metre
+    x0, x1, y0, y1 = (value * k for value in grid.extent)
+    ax.imshow(class_image(grid.classes, grid.levels), origin="lower", extent=(x0, x1, y0, y1), interpolation="nearest")
+    small = grid.classes.size <= MOST_CELLS_LINED
+    if small:
+        draw_lines(ax, grid, k)
+        draw_levels(ax, grid, k)
+    for outline in outlines:
+        ax.add_patch(patches.Polygon(outline.corners_xy * k, fill=False, ec=OUTLINES[outline.kind], lw=1.2, zorder=3))
+    for mark in landmarks:
+        ax.add_patch(mark_patch(mark, k))
+    if track_xy is not None and len(track_xy) > 1:
+        halo = [effects.Stroke(linewidth=3.2, foreground="white"), effects.Normal()]
+        ax.plot(*(track_xy * k).T, color=TRACK, lw=1.6, marker="o", ms=2.2, zorder=5, path_effects=halo)
+    if plan_xy is not None and len(plan_xy) > 1:
+        draw_plan(ax, plan_xy * k)
+    if start_xy is not None:
+        ax.plot(start_xy[0] * k, start_xy[1] * k, "o", ms=8, mfc="white", mec=INK, mew=1.6, zorder=7)
+    if goal_xy is not None:
+        draw_goal(ax, goal_xy, goal_radius if small else None, k)
+    frame(ax, (x0, x1, y0, y1), axis)
+
+
+def draw_lines(ax: Axes, grid: ClassGrid, k: float) -> None:
+    """Thin lines between cells."""
+    rows, columns = grid.shape
+    x0, x1, y0, y1 = (value * k for value in grid.extent)
+    style = {"color": "#606060", "lw": 0.4, "alpha": 0.22, "zorder": 1}
+    ax.vlines(np.linspace(x0, x1, columns + 1)[1:-1], y0, y1, **style)
+    ax.hlines(np.linspace(y0, y1, rows + 1)[1:-1], x0, x1, **style)
+
+
+def draw_levels(ax: Axes, grid: ClassGrid, k: float) -> None:
+    """The level in each bump cell."""
+    bumps = np.argwhere(grid.classes == Cell.BUMP)
+    style = {"color": "white", "size": 6, "ha": "center", "va": "center", "clip_on": True, "zorder": 2}
+    for (i, j), (x, y) in zip(bumps, grid.centres_xy(bumps) * k, strict=True):
+        ax.text(x, y, str(grid.levels[i, j]), **style)
+
+
+def draw_plan(ax: Axes, path: Float[np.ndarray, "n 2"]) -> None:
+    """A path in axis units: one arrow per step, or a line when there are too many to tell apart."""
+    if len(path) <= MOST_ARROWS:
+        (x, y), (u, v) = path[:-1].T, np.diff(path, axis=0).T
+        options = {"headwidth": 4.5, "headlength": 5, "headaxislength": 4.5, "width": 0.004}
+        ax.quiver(x, y, u, v, angles="xy", scale_units="xy", scale=1, color=PLAN, zorder=6, **options)
+    else:
+        ax.plot(*path.T, color=PLAN, lw=1.8, zorder=6)
+
+
+def draw_goal(ax: Axes, goal_xy: tuple[float, float], radius: float | None, k: float) -> None:
+    """A cross, and around it the broken circle within which the goal counts as reached."""
+    x, y = goal_xy[0] * k, goal_xy[1] * k
+    ax.plot(x, y, "x", ms=9, mec=INK, mew=2.4, zorder=7)
+    if radius is not None:
+        ax.add_patch(patches.Circle((x, y), radius * k, fill=False, ec=INK, ls=(0, (4, 3)), lw=1.2, zorder=7))
+
+
+def mark_patch(mark: Mark, k: float) -> patches.Patch:
+    """A landmark: a red disc or a blue square, as in the paper."""
+    x, y = mark.xy[0] * k, mark.xy[1] * k
+    if mark.kind == "circle":
+        return patches.Circle((x, y), DISC_RADIUS * k, fc="#ff3b30", ec="white", alpha=0.55, lw=0.8, zorder=2.5)
+    side, corner = SQUARE_SIDE * k, SQUARE_SIDE * k / 2
+    angle = math.degrees(mark.yaw)
+    return patches.Rectangle(
+        (x - corner, y - corner), side, side, angle=angle, rotation_point="center", fc="#0a60ff", ec="white", zorder=2.5
+    )
+
+
+def frame(ax: Axes, extent: tuple[float, float, float, float], axis: Axis) -> None:
+    """Limits, labels and a thin border."""
+    x0, x1, y0, y1 = extent
+    ax.set(xlim=(x0, x1), ylim=(y1, y0) if axis.y_down else (y0, y1), aspect="equal")
+    ax.set(xlabel=f"x [{axis.unit}]", ylabel=f"y [{axis.unit}]")
+    ax.tick_params(labelsize=8, color=INK)
+    for spine in ax.spines.values():
+        spine.set(color="#888888", linewidth=0.8)
+
+
+def legend(figure: Figure, *, plan: bool = True, track: bool = False, truth: bool = False) -> None:
+    """One row under the figure that says what colours and lines mean."""
+    handles = [patches.Patch(fc=COLOURS[cell], ec="#888888", lw=0.6, label=cell.name.lower()) for cell in Cell]
+    if truth:
+        handles.append(patches.Patch(fill=False, ec=INK, lw=1.2, label="true outline"))
+    if plan:
+        handles.append(Line2D([], [], color=PLAN, lw=2, marker=">", ms=5, label="plan"))
+    if track:
+        handles.append(Line2D([], [], color=TRACK, lw=1.6, marker="o", ms=3, label="walked"))
+    handles.append(Line2D([], [], ls="", marker="o", ms=7, mfc="white", mec=INK, mew=1.5, label="start"))
+    handles.append(Line2D([], [], ls="", marker="x", ms=7, mec=INK, mew=2, label="goal"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False, handlelength=1.6)
+
+
+def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
+    """Write `figure` as PNG, whole or not at all; raise `InputError` when that fails."""
+    write_whole(path, lambda file: figure.savefig(file, format="png", dpi=dpi, facecolor="white"))
+
+
+def save_map(path: str | Path, grid: ClassGrid, *, title: str = "", **what) -> None:
+    """A PNG of one map; `what` goes to `draw_map`."""
+    rows, columns = grid.shape
+    width = 7.0
+    figure = Figure(figsize=(width, float(np.clip(width * rows / columns, 2.5, 10)) + 1.0), layout="constrained")
+    ax = figure.subplots()
+    draw_map(ax, grid, **what)
+    ax.set_title(title, fontsize=10)
+    legend(figure, track=what.get("track_xy") is not None, truth=bool(what.get("outlines")))
+    save_figure(figure, path)
+
+
+def moment(log: MissionLog, t: int) -> ClassGrid:
+    """The map that the robot held at moment `t`."""
+    return ClassGrid(log.classes[t], log.levels[t], np.asarray(log.origin_xy, float), log.pitch)
+
+
+def save_mission(path: str | Path, log: MissionLog, *, title: str = "", panels: int = 4) -> None:
+    """A PNG of a mission: the map at up to `panels` moments, evenly spaced, the plan ahead and the track so far."""
+    moments = np.unique(np.linspace(0, len(log.time) - 1, panels).round().astype(int)).tolist()
+    columns = min(2, len(moments))
+    rows = math.ceil(len(moments) / columns)
+    height = 4.6 * float(log.size_xy[1] / log.size_xy[0]) + 0.75
+    figure = Figure(figsize=(5.2 * columns, height * rows + 0.9), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for ax, t in zip(axes, moments, strict=False):
+        draw_map(
+            ax,
+            moment(log, t),
+            plan_xy=log.plan[t],
+            track_xy=log.true_xyyaw[: t + 1, :2],
+            start_xy=tuple(log.true_xyyaw[0, :2]),
+            goal_xy=tuple(log.goal_xy),
+            outlines=log.outlines,
+            landmarks=log.landmarks,
+        )
+        ax.set_title(f"{log.time[t]:.0f} s: {caption(log, t)}", fontsize=9)
+    for ax in axes[len(moments) :]:
+        ax.remove()
+    figure.suptitle(title, fontsize=11)
+    legend(figure, track=True, truth=bool(log.outlines))
+    save_figure(figure, path)
+
+
+def caption(log: MissionLog, t: int) -> str:
+    """What was done last, and at the end how the mission ended."""
+    last = t == len(log.time) - 1
+    return f"{log.action[t]} ({log.outcome.replace('_', ' ')})" if last and log.outcome else log.action[t]

@@ -1,0 +1,151 @@
+"""Pictures and films: the paper's colours in the right cells, and files that are whole or not there."""
+
+import errno
+import itertools
+import os
+import time
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from PIL import Image
+
+from jaxbiped.errors import InputError
+from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.mission.log import Mark, MissionLog, Outline
+from jaxbiped.report import animation, pictures
+
+
+def rgb(colour):
+    return tuple(round(channel * 255) for channel in to_rgb(colour))
+
+
+def mission(moments=5, rows=7, columns=9):
+    """A walk along x over a map that is seen column by column."""
+    full = np.tile(np.array([1, 1, 1, 2, 2, 3, 4, 1, 1], np.int8)[:columns], (rows, 1))
+    up = np.tile(np.array([0, 0, 0, 1, 2, 0, 0, 0, 0], np.int8)[:columns], (rows, 1))
+    seen = [np.arange(columns) < columns * (t + 1) / moments for t in range(moments)]
+    x = np.linspace(0.1, 0.35, moments)
+    xyyaw = np.stack([x, np.full(moments, 0.2), np.linspace(0, 1, moments)], 1)
+    plans = [np.stack([np.linspace(a, 0.4, 4), np.full(4, 0.2)], 1) for a in x[:-1]] + [np.zeros((0, 2))]
+    corners = np.array([[0.15, 0.0], [0.25, 0.0], [0.25, 0.35], [0.15, 0.35]])
+    return MissionLog(
+        classes=np.stack([np.where(s, full, 0) for s in seen]).astype(np.int8),
+        levels=np.stack([np.where(s, up, 0) for s in seen]).astype(np.int8),
+        true_xyyaw=xyyaw,
+        estimated_xyyaw=xyyaw + 0.01,
+        plan=tuple(plans),
+        time=np.arange(moments) * 26.0,
+        action=("Start",) + ("Straight-forward",) * (moments - 1),
+        pitch=0.05,
+        origin_xy=np.zeros(2),
+        size_xy=np.array([columns, rows]) * 0.05,
+        goal_xy=np.array([0.4, 0.2]),
+        outlines=(Outline(corners, "bump"), Outline(corners + 0.1, "gate"), Outline(corners + 0.2, "obstacle")),
+        landmarks=(Mark((0.1, 0.3), 0.0, "circle"), Mark((0.1, 0.1), 0.5, "square")),
+        outcome="reached",
+    )
+
+
+def test_each_class_has_the_colour_of_the_paper():
+    classes = np.array([[0, 1, 2, 2, 2, 2, 3, 4]], np.int8)
+    levels = np.array([[0, 0, 1, 2, 9, -2, 0, 0]], np.int8)
+    image = pictures.class_image(classes, levels)
+    shades = [rgb(shade) for shade in pictures.BUMP_SHADES]
+    expected = [pictures.COLOURS[Cell.UNMEASURED], pictures.COLOURS[Cell.FLOOR]]
+    expected = [rgb(c) for c in expected] + [shades[0], shades[1], shades[2], shades[1]]
+    expected += [rgb(pictures.COLOURS[Cell.GATE]), rgb(pictures.COLOURS[Cell.OBSTACLE])]
+    assert [tuple(pixel) for pixel in image[0].tolist()] == expected
+    assert expected[0] == (255, 255, 255)
+    red, green, blue = rgb(pictures.COLOURS[Cell.OBSTACLE])
+    assert red > 2 * max(green, blue) - 60 and shades[0][2] > shades[0][0]
+
+
+def drawn(grid, **what):
+    """What the middle of each cell looks like once drawn, row 0 first."""
+    figure = Figure(figsize=(4, 4 * grid.shape[0] / grid.shape[1]), dpi=100)
+    ax = figure.add_axes((0, 0, 1, 1))
+    pictures.draw_map(ax, grid, **what)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3]
+    centres = ax.transData.transform(grid.centres_xy(np.argwhere(np.ones(grid.shape))) * 100 + [1.7, 1.7])
+    rows = pixels.shape[0] - 1 - np.floor(centres[:, 1]).astype(int)
+    return pixels[rows, np.floor(centres[:, 0]).astype(int)].reshape(*grid.shape, 3)
+
+
+def test_cells_are_drawn_where_they_are():
+    classes = np.array([[1, 4, 0], [3, 1, 2]], np.int8)
+    grid = ClassGrid(classes, (classes == 2).astype(np.int8), np.array([1.0, -2.0]), 0.05)
+    np.testing.assert_array_equal(drawn(grid), pictures.class_image(grid.classes, grid.levels))
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (150, 100)])
+def test_maps_of_any_size_are_drawn(shape, tmp_path):
+    grid = ClassGrid(np.ones(shape, np.int8), np.zeros(shape, np.int8), np.zeros(2), 0.05)
+    path = grid.centres_xy(np.argwhere(grid.classes)[:200])
+    pictures.save_map(tmp_path / "a.png", grid, plan_xy=path, start_xy=(0.0, 0.0), goal_xy=(0.02, 0.02), title="a")
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.format == "PNG" and min(image.size) > 300
+
+
+@pytest.mark.parametrize("moments", [1, 2, 3, 5])
+def test_a_mission_picture_is_written(moments, tmp_path):
+    pictures.save_mission(tmp_path / "m.png", mission(moments), title="a mission")
+    assert os.listdir(tmp_path) == ["m.png"]
+    with Image.open(tmp_path / "m.png") as image:
+        assert image.size[0] > 700
+
+
+def test_a_film_has_a_frame_a_moment(tmp_path):
+    animation.save_gif(tmp_path / "m.gif", mission(5))
+    with Image.open(tmp_path / "m.gif") as film:
+        assert film.n_frames == 5
+        frames, durations = [], []
+        for k in range(5):
+            film.seek(k)
+            durations.append(film.info["duration"])
+            frames.append(np.asarray(film.convert("RGB")).astype(int))
+    assert durations == [200, 200, 200, 200, 2000]
+    assert all((a != b).any() for a, b in itertools.pairwise(frames))
+
+    def share(frame, cell):
+        return (np.abs(frame - rgb(pictures.COLOURS[cell])).max(-1) <= 6).mean()
+
+    for cell in (Cell.GATE, Cell.OBSTACLE):  # seen at the end, not at the start
+        assert share(frames[-1], cell) > share(frames[0], cell) + 0.02
+    assert os.listdir(tmp_path) == ["m.gif"]
+
+
+def test_a_film_of_one_moment(tmp_path):
+    animation.save_gif(tmp_path / "m.gif", mission(1))
+    with Image.open(tmp_path / "m.gif") as film:
+        assert film.n_frames == 1
+
+
+def test_thirty_frames_take_seconds_and_little_room(tmp_path):
+    start = time.perf_counter()
+    animation.save_gif(tmp_path / "m.gif", mission(30, 28, 9))
+    assert time.perf_counter() - start < 30  # 3 s on two idle cores
+    assert (tmp_path / "m.gif").stat().st_size < 3e6
+
+
+@pytest.mark.parametrize("save", [pictures.save_mission, animation.save_gif])
+def test_a_full_disk_leaves_nothing(save, tmp_path, monkeypatch):
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError) as caught:
+        save(tmp_path / "m.x", mission(2))
+    assert str(caught.value) == f"{tmp_path / 'm.x'}: cannot be written: no space left on device"
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_log_whose_parts_differ_in_length_is_refused():
+    whole = vars(mission(3))
+    with pytest.raises(ValueError, match="action has 2 moments, time has 3"):
+        MissionLog(**whole | {"action": ("Start", "Turn-direction")})
