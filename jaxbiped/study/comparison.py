@@ -109,7 +109,7 @@ def compare(
       pairs: (first, second) to compare; by default `default_pairs`.
       seed: of the bootstraps; each one gets its own stream from it.
     """
-    frame = validate(frame).filter(pl.col("point") == point)
+    frame = validate(frame).filter(pl.col("point") == point).sort("arena")
     if frame.is_empty():
         raise InputError("no row of this sweep point", field="point", value=point)
     present = set(frame["strategy"])

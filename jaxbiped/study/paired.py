@@ -13,6 +13,8 @@ from statsmodels.stats.weightstats import DescrStatsW
 
 from jaxbiped.study.intervals import NOTHING, Estimate, mean_and_median, paired_difference, score_statistic
 
+EXACT_LIMIT = 50  # samples up to which the signed-rank test is exact
+
 
 @dataclass(frozen=True)
 class PairedMetric:
@@ -46,15 +48,31 @@ def success_difference(first: Bool[np.ndarray, "n"], second: Bool[np.ndarray, "n
 def signed_rank(differences: Float[np.ndarray, "n"]) -> float | None:
     """Two-sided p of Wilcoxon's signed-rank test; None without samples.
 
-    Zeros keep their ranks, which are then left out of both sums (Pratt, 1959). Without zeros and ties the test is
-    exact up to 50 samples, else normal, as `scipy.stats.wilcoxon` chooses. Differences that are all zero say nothing
-    against "no difference": p is 1.
+    Zeros take part in the ranking and are then left out of both sums (Pratt, 1959). Up to `EXACT_LIMIT` samples the
+    test is exact, given the ranks; beyond it is `scipy.stats.wilcoxon`'s normal approximation, corrected for ties.
+    Differences that are all zero say nothing against "no difference": p is 1.
     """
     if len(differences) == 0:
         return None
     if not np.any(differences):
         return 1.0
-    return float(stats.wilcoxon(differences, zero_method="pratt").pvalue)
+    if len(differences) <= EXACT_LIMIT:
+        return exact_signed_rank(differences)
+    return float(stats.wilcoxon(differences, zero_method="pratt", method="asymptotic").pvalue)
+
+
+def exact_signed_rank(differences: Float[np.ndarray, "n"]) -> float:
+    """The same p from the distribution of the rank sum over all signs, ties and zeros as they are.
+
+    SciPy has it for samples without ties; with ties it permutes, which takes seconds.
+    """
+    ranks = np.round(2 * stats.rankdata(np.abs(differences))).astype(int)  # doubled: ties have half ranks
+    counts = np.ones(1)  # of the sign patterns, by the doubled sum of the positive ranks
+    for rank in ranks[differences != 0]:
+        counts = np.pad(counts, (0, rank)) + np.pad(counts, (rank, 0))
+    observed = int(np.sum(ranks[differences > 0]))
+    tail = min(np.sum(counts[: observed + 1]), np.sum(counts[observed:]))
+    return float(min(1.0, 2 * tail / np.sum(counts)))
 
 
 def improvement(differences: Float[np.ndarray, "n"], level: float = 0.95) -> Estimate:
