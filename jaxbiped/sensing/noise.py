@@ -139,8 +139,8 @@ def match(
     # Slopes and edges.
     left, right, up, down = disparity[1:-1, :-2], disparity[1:-1, 2:], disparity[:-2, 1:-1], disparity[2:, 1:-1]
     to_left, to_right, to_up, to_down = left - d, right - d, up - d, down - d
-    across = jnp.minimum(jnp.abs(to_left), jnp.abs(to_right)) * (1 / image.stride[0])
-    along = jnp.minimum(jnp.abs(to_up), jnp.abs(to_down)) * (1 / image.stride[1])
+    across = slope(to_left, to_right) * (1 / image.stride[0])
+    along = slope(to_up, to_down) * (1 / image.stride[1])
     bend_across, bend_along = jnp.abs(to_left + to_right), jnp.abs(to_up + to_down)
     edge = jnp.maximum(bend_across, bend_along) > noise.edge_jump
     grazing = jnp.maximum(across, along) > noise.grazing_slope
@@ -169,6 +169,11 @@ def match(
     matched = phantom | ~(hidden | near | dropped)
     in_reach = (measured > 0) & (measured <= camera.max_disparity) & (measured <= u)
     return jnp.where(matched & in_reach & textured & (d > 0), measured, 0.0)
+
+
+def slope(before: Float[Array, "*s"], after: Float[Array, "*s"]) -> Float[Array, "*s"]:
+    """Size of the slope that the differences to the ray before and the ray after agree on; 0 on a peak."""
+    return jnp.where(before * after < 0, jnp.minimum(jnp.abs(before), jnp.abs(after)), 0.0)
 
 
 def hidden_from_right(
