@@ -37,6 +37,7 @@ class Thought:
     cost: Float[Array, "B H W"]  # cost to go
     ij: Int[Array, "B 2"]
     goal_ij: Int[Array, "B 2"]
+    pose: Pose  # [B] as believed
 
 
 def decide(
@@ -65,7 +66,7 @@ def decide(
     mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         mind, ij, goal_ij, directions, classes, levels, blind, spec
     )
-    return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij)
+    return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij, mind.belief.pose)
 
 
 def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, spec: GridSpec):

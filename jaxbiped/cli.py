@@ -1,0 +1,82 @@
+"""The command line: `jaxbiped COMMAND ...`. Each command is a module with its options and its `main`."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import pydantic
+
+from jaxbiped import __version__
+from jaxbiped.config import Model, input_error, load_toml, parse
+from jaxbiped.errors import InputError
+
+# command: (module, options, one line, whether a TOML file may come first and give the defaults)
+COMMANDS = {
+    "compare": ("compare", "CompareArgs", "compare strategies on random arenas, with statistics", True),
+    "run": ("run", "RunArgs", "run one mission in a scene, with pictures", False),
+    "plan": ("plan", "PlanArgs", "plan on a map that you have: Moving AI, ROS map_server, class grid", False),
+    "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
+}
+WRONG_INPUT = 2  # exit status
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command; the entry point of the package.
+
+    Returns:
+      The exit status: 0, 1 for a result that is a failure, 2 for input that cannot be used (one line on stderr), 130
+      when interrupted.
+    """
+    argv = list(sys.argv[1:] if argv is None else argv)
+    if not argv or argv[0] in ("-h", "--help"):
+        print(usage())
+        return 0 if argv else WRONG_INPUT
+    if argv[0] == "--version":
+        print(f"jaxbiped {__version__}")
+        return 0
+    try:
+        return dispatch(argv[0], argv[1:])
+    except InputError as error:
+        print(f"jaxbiped: {error}", file=sys.stderr)
+        return WRONG_INPUT
+    except KeyboardInterrupt:
+        print("jaxbiped: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def dispatch(name: str, rest: list[str]) -> int:
+    """Parse the options of a command, and run it."""
+    if name not in COMMANDS:
+        raise InputError(f"must be one of {', '.join(COMMANDS)}", field="command", value=name)
+    import tyro
+
+    module_name, options_name, summary, takes_file = COMMANDS[name]
+    module = importlib.import_module(f"jaxbiped.commands.{module_name}")
+    options: type[Model] = getattr(module, options_name)
+    default = tyro.MISSING
+    if takes_file and rest and not rest[0].startswith("-"):
+        path = Path(rest.pop(0))
+        default = parse(options, load_toml(path), file=path)
+    try:
+        extra = {} if default is tyro.MISSING else {"default": default}
+        args = tyro.cli(options, prog=f"jaxbiped {name}", args=rest, description=options.__doc__ or summary, **extra)
+    except pydantic.ValidationError as error:
+        raise input_error(error) from None
+    return module.main(args)
+
+
+def usage() -> str:
+    """What `jaxbiped --help` prints."""
+    lines = "\n".join(f"  {name:<9} {summary}" for name, (_, _, summary, _) in COMMANDS.items())
+    return f"usage: jaxbiped COMMAND [options]\n\n{lines}\n\n`jaxbiped COMMAND --help` lists its options."
+
+
+if __name__ == "__main__":
+    sys.exit(main())
