@@ -1,6 +1,5 @@
 """Paired statistics of strategies, and the store of their results."""
 
-from jaxbiped.study.atomic import write_atomically
 from jaxbiped.study.comparison import (
     ALL,
     QUESTION,
@@ -63,5 +62,4 @@ __all__ = [
     "signed_rank",
     "success_difference",
     "validate",
-    "write_atomically",
 ]

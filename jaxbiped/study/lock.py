@@ -8,7 +8,7 @@ import socket
 from pathlib import Path
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.atomic import cannot_write
+from jaxbiped.files import reason
 
 LOCK = ".lock"
 
@@ -25,7 +25,7 @@ class FolderLock:
             try:
                 self.descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             except OSError as error:
-                raise cannot_write(self.path, error) from None
+                raise InputError(f"cannot be written: {reason(error)}", file=self.path) from None
             try:
                 fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 if self.is_current():
@@ -41,7 +41,7 @@ class FolderLock:
                 ) from None
             except OSError as error:
                 os.close(self.descriptor)
-                raise cannot_write(self.path, error) from None
+                raise InputError(f"cannot be written: {reason(error)}", file=self.path) from None
             os.close(self.descriptor)  # its last holder removed this file between our open and our lock: try anew
 
     def is_current(self) -> bool:

@@ -28,7 +28,7 @@ import pydantic
 from jaxbiped import __version__
 from jaxbiped.config import Model, config_hash, parse
 from jaxbiped.errors import InputError
-from jaxbiped.study.atomic import cannot_write, write_atomically
+from jaxbiped.files import reason, write_whole
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.schema import SCHEMA, STRATEGIES, validate
 
@@ -101,9 +101,9 @@ class Store:
         path = shard_path(self.folder, shard)
         if shard in done:
             raise InputError("this shard is written already", file=path)
-        buffer = io.BytesIO()
+        buffer = io.BytesIO()  # polars would turn a full disk into an error of its own
         validate(frame).write_parquet(buffer)
-        write_atomically(path, buffer.getvalue())
+        write_whole(path, lambda file: file.write(buffer.getvalue()))
         return path
 
     def done(self) -> set[int]:
@@ -122,7 +122,8 @@ class Store:
     def write_manifest(self, **changes: Any) -> None:
         """Replace the manifest with a changed one."""
         self.manifest = self.manifest.model_copy(update=changes)
-        write_atomically(self.folder / MANIFEST, (self.manifest.model_dump_json(indent=2) + "\n").encode())
+        text = self.manifest.model_dump_json(indent=2) + "\n"
+        write_whole(self.folder / MANIFEST, lambda file: file.write(text.encode()))
 
     def close(self) -> None:
         """Let go of the folder; say "stopped" if it is not finished, remove it if nothing was written."""
@@ -174,7 +175,7 @@ def create(
     except (OSError, InputError) as error:
         if made:
             remove_if_empty(folder)
-        raise cannot_write(folder, error) if isinstance(error, OSError) else error from None
+        raise as_input_error(folder, error) from None
     try:
         refuse_filled(folder)  # another process may have come and gone before we had the lock
     except InputError:
@@ -186,8 +187,13 @@ def create(
         store.write_manifest()
     except (OSError, InputError) as error:
         store.close()
-        raise cannot_write(folder, error) if isinstance(error, OSError) else error from None
+        raise as_input_error(folder, error) from None
     return store
+
+
+def as_input_error(folder: Path, error: OSError | InputError) -> InputError:
+    """The one line about a folder that cannot be made or filled."""
+    return error if isinstance(error, InputError) else InputError(f"cannot be written: {reason(error)}", file=folder)
 
 
 def remove_if_empty(folder: Path) -> None:
