@@ -79,10 +79,10 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
     outside = (x < 0) | (x > arena.size_xy[0]) | (y < 0) | (y > arena.size_xy[1])
 
     seed = fold(world.seed, ODOMETRY, world.decisions)
-    moved, variances = drift(jnp.stack([dx, dy, command.turn]), settings.odometry, seed)
+    moved, variances = drift((dx, dy, command.turn), settings.odometry, seed)
     return Execution(
         pose=Pose(x, y, z, yaw),
-        moved=moved,
+        moved=jnp.stack(moved),
         variances=variances,
         time=duration(command, settings.durations),
         distance=command.length,
