@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, Int8
 
 from jaxbiped.mapping.grid import Cell
 
@@ -49,61 +49,64 @@ class Rules:
     gates: Bool[Array, "*B"] | bool = True  # squat through; else gate cells are obstacles
 
 
-def blocked_cells(classes: Int[Array, "*S"], rules: Rules) -> Bool[Array, "*S"]:
-    """Cells that are obstacles under `rules`, whose leaves broadcast against `classes` from the right."""
+# what a move is, worst last: the precedence of the paper's 2.3 is a plain maximum over ends and rise
+LEVEL, IN_GATE, STEP, UNMEASURED, FORBIDDEN = range(5)
+
+
+def cell_kinds(classes: Int[Array, "*S"], rules: Rules) -> Int8[Array, "*S"]:
+    """What a cell makes of the moves that touch it; the leaves of `rules` broadcast from the right."""
     bump = (classes == Cell.BUMP) & ~jnp.asarray(rules.bumps)
-    gate = (classes == Cell.GATE) & ~jnp.asarray(rules.gates)
-    return (classes == Cell.OBSTACLE) | bump | gate
+    gate = classes == Cell.GATE
+    blocked = (classes == Cell.OBSTACLE) | bump | (gate & ~jnp.asarray(rules.gates))
+    kind = jnp.where(blocked, FORBIDDEN, jnp.where(classes == Cell.UNMEASURED, UNMEASURED, jnp.where(gate, IN_GATE, 0)))
+    return kind.astype(jnp.int8)
 
 
-def move_cost(k: int, here, there, side_a, side_b, costs: Costs, rules: Rules):
-    """Cost of the move in direction `k`, inf where it is forbidden.
+def move_kind(here, there, sides, corner_cutting) -> Int8[Array, "*S"]:
+    """What a move is. `here`, `there`: (kind, level) of its ends; `sides`: the kinds of the two orthogonal
+    neighbours of an oblique move, None for a straight one."""
+    (kind_a, level_a), (kind_b, level_b) = here, there
+    rise = jnp.abs(level_a.astype(jnp.int16) - level_b.astype(jnp.int16))
+    rise = jnp.where(rise == 0, LEVEL, jnp.where(rise == 1, STEP, FORBIDDEN)).astype(jnp.int8)
+    kind = jnp.maximum(jnp.maximum(kind_a, kind_b), rise)
+    if sides is not None:
+        one, both = jnp.maximum(*sides) == FORBIDDEN, jnp.minimum(*sides) == FORBIDDEN
+        kind = jnp.where(both | (one & ~jnp.asarray(corner_cutting)), FORBIDDEN, kind).astype(jnp.int8)
+    return kind
 
-    `here` and `there` are (blocked, class, level) of its two ends; `side_a` and `side_b` are blocked at the two
-    orthogonal neighbours of an oblique move. Precedence as in the paper's 2.3 and its figure 9: an end
-    blocked or more than one level: forbidden; an unmeasured end: C4; one level: C3; a gate: C2; else C1.
-    """
-    (blocked_a, class_a, level_a), (blocked_b, class_b, level_b) = here, there
-    rise = jnp.abs(level_a.astype(jnp.int32) - level_b.astype(jnp.int32))
-    forbidden = blocked_a | blocked_b | (rise > 1)
-    oblique = bool(np.all(DIRECTIONS[k] != 0))
-    if oblique:
-        forbidden |= (side_a & side_b) | ((side_a | side_b) & ~jnp.asarray(rules.corner_cutting))
-    unmeasured = (class_a == Cell.UNMEASURED) | (class_b == Cell.UNMEASURED)
-    gate = (class_a == Cell.GATE) | (class_b == Cell.GATE)
+
+def kind_cost(kind: Int8[Array, "*S"], costs: Costs, oblique: bool) -> Float[Array, "*S"]:
+    """C_distance + C_motion of a move (paper, Eq. 1); inf where it is forbidden."""
     c0, c1, c2, c3, c4 = (jnp.asarray(c, jnp.float32) for c in (costs.c0, costs.c1, costs.c2, costs.c3, costs.c4))
-    motion = jnp.where(unmeasured, c4, jnp.where(rise == 1, c3, jnp.where(gate, c2, c1)))
     distance = c0 * np.float32(np.sqrt(2)) if oblique else c0
-    return jnp.where(forbidden, jnp.inf, distance + motion)
+    out = jnp.where(kind == FORBIDDEN, jnp.inf, distance + c4)
+    for what, cost in ((STEP, c3), (IN_GATE, c2), (LEVEL, c1)):
+        out = jnp.where(kind == what, distance + cost, out)
+    return out
 
 
-def edges_batch_last(
+def half_edges(
     classes: Int[Array, "H W B"], levels: Int[Array, "H W B"], costs: Costs, rules: Rules
-) -> Float[Array, "8 H W B"]:
-    """`edge_costs` with the batch as the last axis, which is what the kernels want.
+) -> tuple[Float[Array, "H2 W2 B"], ...]:
+    """Costs of the first four directions, batch last, with a ring of inf (H2 = H + 2, W2 = W + 2).
 
-    The cost of a move is that of the move back, so that four directions are computed and four are shifted.
+    A move costs what the move back costs, so that these four are all.
     """
     height, width, _ = classes.shape
-    ring = ((1, 1), (1, 1), (0, 0))
-    classes = jnp.pad(classes, ring, constant_values=int(Cell.OBSTACLE))
+    ring = ((1, 2), (2, 2), (0, 0))
+    kinds = jnp.pad(cell_kinds(classes, rules), ring, constant_values=FORBIDDEN)
     levels = jnp.pad(levels, ring)
-    blocked = blocked_cells(classes, rules)
 
     def at(array, di, dj):
-        return array[1 + di : 1 + di + height, 1 + dj : 1 + dj + width]
+        return array[di : di + height + 2, 1 + dj : 1 + dj + width + 2]
 
-    def ends(di, dj):
-        return at(blocked, di, dj), at(classes, di, dj), at(levels, di, dj)
+    def edges(k):
+        di, dj = (int(d) for d in DIRECTIONS[k])
+        here, there = ((at(kinds, *c), at(levels, *c)) for c in ((0, 0), (di, dj)))
+        sides = (at(kinds, di, 0), at(kinds, 0, dj)) if di and dj else None
+        return kind_cost(move_kind(here, there, sides, rules.corner_cutting), costs, sides is not None)
 
-    out = []
-    for k in range(4):
-        di, dj = DIRECTIONS[k]
-        out.append(move_cost(k, ends(0, 0), ends(di, dj), at(blocked, di, 0), at(blocked, 0, dj), costs, rules))
-    for k in range(4):
-        di, dj = DIRECTIONS[k]
-        out.append(at(jnp.pad(out[k], ring, constant_values=jnp.inf), -di, -dj))
-    return jnp.stack(out)
+    return tuple(edges(k) for k in range(4))
 
 
 def edge_costs(
@@ -122,4 +125,8 @@ def edge_costs(
     Deviation: the paper says nothing of oblique moves past the corner of an obstacle; `Rules.corner_cutting`.
     """
     last = (jnp.moveaxis(jnp.asarray(a), 0, -1) for a in (classes, levels))
-    return jnp.moveaxis(edges_batch_last(*last, costs or Costs(), rules or Rules()), -1, 0)
+    half = half_edges(*last, costs or Costs(), rules or Rules())
+    height, width = classes.shape[1:]
+    back = [(1, 1)] * 4 + [(1 + int(di), 1 + int(dj)) for di, dj in DIRECTIONS[4:]]
+    out = [half[k % 4][i : i + height, j : j + width] for k, (i, j) in enumerate(back)]
+    return jnp.moveaxis(jnp.stack(out), -1, 0)

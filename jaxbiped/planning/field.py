@@ -12,10 +12,12 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.errors import InputError
 from jaxbiped.planning import kernels
-from jaxbiped.planning.costs import Costs, Rules, edges_batch_last
+from jaxbiped.planning.costs import Costs, Rules, half_edges
 
-CHUNK = 64  # arenas relaxed together: what fits the cache, and few enough that one slow map holds few others
-SINGLE_CELLS = 1100  # grids up to this size are summed in float32, larger ones in float64 (see `settled`)
+CHUNK = 128  # arenas relaxed together at most: what fits the cache, and few enough that a slow map holds few others
+LANES = 80  # and at least, made up with copies: compilers unroll loops of up to 64 and then leave them unvectorised
+FEW = 16  # below this many the copies cost more than they save
+SINGLE_CELLS = 1200  # grids up to this size are summed in float32, larger ones in float64 (see `_solve`)
 
 
 @jax.tree_util.register_dataclass
@@ -39,7 +41,13 @@ def cost_to_go(
       method: "line_sweep", "wavefront", or "auto" (by platform).
     """
     edges, goal_ij = jnp.asarray(edge_costs), jnp.asarray(goal_ij)
-    return _by_chunks(lambda e, g: _solve(jnp.moveaxis(e, 0, -1), g, method), (edges, goal_ij))
+
+    def chunk(edges, goal):
+        valid = (edges >= 0).all((1, 2, 3))
+        last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
+        return _solve(tuple(last), goal, method, valid)
+
+    return _by_chunks(chunk, (edges, goal_ij))
 
 
 def field(
@@ -63,38 +71,39 @@ def field(
         costs, rules = each
         last = (jnp.moveaxis(a, 0, -1) for a in (classes, levels))
         valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)  # False for NaN as well
-        return _solve(edges_batch_last(*last, costs, rules), goal, method, valid)
+        return _solve(half_edges(*last, costs, rules), goal, method, valid)
 
     return _by_chunks(chunk, (jnp.asarray(classes), jnp.asarray(levels), each, jnp.asarray(goal_ij)))
 
 
-def _solve(edges, goal_ij, method, valid=None) -> CostToGo:
+def _solve(edges, goal_ij, method, valid) -> CostToGo:
     if method not in ("auto", *kernels.METHODS):
         raise InputError(f"must be one of auto, {', '.join(kernels.METHODS)}", field="method", value=method)
-    relax = kernels.METHODS[kernels.default_method() if method == "auto" else method]
-    if valid is None:
-        valid = (edges >= 0).all((0, 1, 2))
-    edges = jnp.where(valid, edges, jnp.inf)
+    method = kernels.default_method() if method == "auto" else method
+    edges = tuple(jnp.where(valid, e, jnp.inf) for e in edges)
     # Sums along a path drift by up to half a unit in the last place a move: with float32 a path through a
     # large maze is off by more than 1e-5, so the kernels alone are then float64, in any program.
-    with jax.enable_x64(edges.shape[1] * edges.shape[2] > SINGLE_CELLS):
-        if edges.shape[1] * edges.shape[2] > SINGLE_CELLS:
-            edges = edges.astype(jnp.float64)
-        cost, rounds, converged = kernels.settle(relax, edges, goal_ij)
-        cost = jnp.moveaxis(cost.astype(jnp.float32), -1, 0)
+    large = edges[0].shape[0] * edges[0].shape[1] > SINGLE_CELLS
+    with jax.enable_x64(large):
+        if large:
+            edges = tuple(e.astype(jnp.float64) for e in edges)
+        cost, steps, converged = kernels.settle(method, edges, goal_ij)
+        cost, steps = jnp.moveaxis(cost.astype(jnp.float32), -1, 0), steps.astype(jnp.int32)
     converged &= valid
-    cost = jnp.where(converged[:, None, None], cost, jnp.inf)
-    return CostToGo(cost, rounds, converged)
+    return CostToGo(jnp.where(converged[:, None, None], cost, jnp.inf), steps, converged)
 
 
 def _by_chunks(solve, inputs):
     """`solve(*inputs)` in chunks of the leading axis, one after the other, each stopping by itself."""
     batch = inputs[0].shape[0]
-    if batch <= CHUNK:
-        return solve(*inputs)
-    chunks = -(-batch // CHUNK)
-    fill = chunks * CHUNK - batch
-    pad = lambda a: jnp.pad(a, ((0, fill),) + ((0, 0),) * (a.ndim - 1), mode="edge")  # noqa: E731
-    parts = jax.tree.map(lambda a: pad(a).reshape(chunks, CHUNK, *a.shape[1:]), inputs)
-    out = lax.map(lambda part: solve(*part), parts)
-    return jax.tree.map(lambda a: a.reshape(chunks * CHUNK, *a.shape[2:])[:batch], out)
+    chunks = max(-(-batch // CHUNK), 1)
+    size = batch if batch < FEW else max(-(-batch // chunks), LANES)
+    pad = chunks * size - batch
+    parts = jax.tree.map(lambda a: jnp.pad(a, ((0, pad),) + ((0, 0),) * (a.ndim - 1), mode="edge"), inputs)
+    if chunks == 1:
+        out = solve(*parts)
+    else:
+        parts = jax.tree.map(lambda a: a.reshape(chunks, size, *a.shape[1:]), parts)
+        out = lax.map(lambda part: solve(*part), parts)
+        out = jax.tree.map(lambda a: a.reshape(chunks * size, *a.shape[2:]), out)
+    return jax.tree.map(lambda a: a[:batch], out)

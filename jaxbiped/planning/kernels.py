@@ -1,15 +1,39 @@
-"""Relaxation kernels: cost to go by line sweeps and by a wavefront, on edges [8, H, W, B] with the batch last."""
+"""Relaxation kernels with the batch as the last axis: a pass of line sweeps, a step of the wavefront.
+
+`cost` is [H + 2, W + 2, B] with a ring of inf. `edges` is a tuple of arrays of that shape, also with a ring of
+inf: the costs of leaving a cell in each of the eight `DIRECTIONS`, or of the first four only where a move costs
+what the move back costs.
+"""
 
 from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
 from jax import lax
+from jax.experimental.xla_metadata import set_xla_metadata
 
 from jaxbiped.planning.costs import DIRECTIONS
 
-# directions that look back at the line before, for a sweep down, up, rightwards and leftwards
-BACK = {"down": (5, 6, 7), "up": (1, 2, 3), "right": (3, 4, 5), "left": (7, 0, 1)}
+DI, DJ = ([int(d) for d in column] for column in DIRECTIONS.T)
+
+
+def one_function(function):
+    """Compile `function` to one machine function on a CPU, so that a step of its loops costs nanoseconds.
+
+    By default XLA dispatches each operation of a loop's body by itself: about a microsecond a step, ten times
+    the work of one step here. The two hints ask for a call that stays a call and is emitted whole; where a
+    compiler does not know them, results are the same and come later.
+    """
+
+    def plain(*args):
+        with set_xla_metadata(xla_cpu_small_call=None, inlineable=None):
+            return function(*args)
+
+    def call(*args):
+        with set_xla_metadata(xla_cpu_small_call="true", inlineable="false"):
+            return jax.jit(plain)(*args)
+
+    return call if jax.default_backend() == "cpu" else function
 
 
 def least(a, b):
@@ -17,75 +41,110 @@ def least(a, b):
     return jnp.where(b < a, b, a)
 
 
-def line_sweeps(edges, cost):
-    """One round of four sweeps; in each a line relaxes from the line before, all of its cells at once.
+def take(array, at, size):
+    """`array[at : at + size]` for traced `at` inside the array."""
+    return lax.dynamic_slice(array, at, size, allow_negative_indices=False)
 
-    Within a sweep every path that keeps to a quarter plane settles at once, so that rounds count the turns of
-    a path, not its cells. `cost` is [H + 2, W + 2, B] with a ring of inf.
+
+def put(array, part, at):
+    """`array` with `part` at the traced place `at`."""
+    return lax.dynamic_update_slice(array, part, at, allow_negative_indices=False)
+
+
+def line_sweep(edges, cost, step):
+    """Pass number `step` (down, up, down, ...): (cost, changed [B]).
+
+    Each row relaxes from the row before and along itself, rightwards and then leftwards, so that a path which
+    never turns back settles in one pass. After a pass all moves but those towards the other side are settled:
+    a pass that changes nothing, after one the other way, ends the search.
     """
-    _, height, width, batch = edges.shape
+    height, width, batch = cost.shape[0] - 2, cost.shape[1] - 2, cost.shape[2]
+    up = step % 2 == 1
+    side = jnp.where(up, 1, -1)  # where the row before lies
+    blank = jnp.full((width + 2, batch), jnp.inf, cost.dtype)
 
-    def row(step, cost, backwards):
-        i = height - 1 - step if backwards else step
-        line = lax.dynamic_slice(cost, (i + 1, 1, 0), (1, width, batch))
-        for k in BACK["up" if backwards else "down"]:
-            di, dj = (int(d) for d in DIRECTIONS[k])
-            near = lax.dynamic_slice(cost, (i + 1 + di, 1 + dj, 0), (1, width, batch))
-            line = least(line, near + lax.dynamic_slice(edges, (k, i, 0, 0), (1, 1, width, batch))[0])
-        return lax.dynamic_update_slice(cost, line, (i + 1, 1, 0))
+    def one(array, i, j):
+        return take(array, (i, j, 0), (1, 1, batch))[0]
 
-    def column(step, cost, backwards):
-        j = width - 1 - step if backwards else step
-        line = lax.dynamic_slice(cost, (1, j + 1, 0), (height, 1, batch))
-        for k in BACK["left" if backwards else "right"]:
-            di, dj = (int(d) for d in DIRECTIONS[k])
-            near = lax.dynamic_slice(cost, (1 + di, j + 1 + dj, 0), (height, 1, batch))
-            line = least(line, near + lax.dynamic_slice(edges, (k, 0, j, 0), (1, height, 1, batch))[0])
-        return lax.dynamic_update_slice(cost, line, (1, j + 1, 0))
+    def west(i, j):
+        return one(edges[0], i, j - 1) if len(edges) == 4 else one(edges[4], i, j)
 
-    for relax, lines in ((row, height), (column, width)):
-        for backwards in (False, True):
-            cost = lax.fori_loop(0, lines, lambda s, c, r=relax, b=backwards: r(s, c, b), cost)
-    return cost
+    def across(k, i, j):
+        if len(edges) == 4:
+            return one(edges[k], jnp.minimum(i, i + side), jnp.where(up, j, j - DJ[k]))
+        return jnp.where(up, one(edges[k], i, j), one(edges[k + 4], i, j))
 
+    def row(n, state):
+        cost, before, changed = state
+        i = jnp.where(up, height - n, n + 1)
 
-def wavefront(edges, cost):
-    """Relax every cell from its eight neighbours at once: little depth, much work."""
-    _, height, width, _ = edges.shape
-    inner = cost[1:-1, 1:-1]
-    for k, (di, dj) in enumerate(DIRECTIONS):
-        inner = least(inner, cost[1 + di : 1 + di + height, 1 + dj : 1 + dj + width] + edges[k])
-    return cost.at[1:-1, 1:-1].set(inner)
+        def rightwards(n, state):
+            line, last = state
+            j = n + 1
+            new = least(one(cost, i, j), last + west(i, j))
+            for k in (1, 2, 3):
+                new = least(new, take(before, (j + side * DJ[k], 0), (1, batch)) + across(k, i, j))
+            return put(line, new, (j, 0)), new
 
+        def leftwards(n, state):
+            line, last, changed = state
+            j = width - n
+            new = least(take(line, (j, 0), (1, batch)), last + one(edges[0], i, j))
+            changed = jnp.where(new < one(cost, i, j), 1, changed)
+            return put(line, new, (j, 0)), new, changed
 
-def settle(relax, edges, goal_ij):
-    """Relax until nothing changes; (cost [H, W, B], rounds [B], converged [B]).
+        line, _ = lax.fori_loop(0, width, rightwards, (blank, blank[:1]))
+        line, _, changed = lax.fori_loop(0, width, leftwards, (line, blank[:1], changed))
+        return put(cost, line[None], (i, 0, 0)), line, changed
 
-    A round settles at least one more cell of each least path, so H * W rounds always do for sound costs.
-    """
-    _, height, width, batch = edges.shape
-    rows, columns = (lax.broadcasted_iota(jnp.int32, (height + 2, width + 2, 1), a) - 1 for a in (0, 1))
-    inside = (rows >= 0) & (rows < height) & (columns >= 0) & (columns < width)
-    start = jnp.where(inside & (rows == goal_ij[:, 0]) & (columns == goal_ij[:, 1]), 0.0, jnp.inf)
-    start = start.astype(edges.dtype)
-
-    def again(state):
-        _, changed, rounds = state
-        return jnp.any(changed & (rounds < height * width + 1))
-
-    def body(state):
-        cost, changed, rounds = state
-        new = relax(edges, cost)
-        return new, jnp.any(new < cost, axis=(0, 1)), rounds + changed
-
-    start = start, jnp.ones((batch,), bool), jnp.zeros((batch,), jnp.int32)
-    cost, changed, rounds = lax.while_loop(again, body, start)
-    return cost[1:-1, 1:-1], rounds, ~changed
+    cost, _, changed = lax.fori_loop(0, height, row, (cost, blank, jnp.zeros((1, batch), jnp.int32)))
+    return cost, changed[0] > 0
 
 
-METHODS = {"line_sweep": line_sweeps, "wavefront": wavefront}
+def wavefront(edges, cost, step):
+    """Relax every cell from its eight neighbours at once: (cost, changed [B])."""
+    height, width = cost.shape[0] - 2, cost.shape[1] - 2
+
+    def at(array, di, dj):
+        return array[1 + di : 1 + di + height, 1 + dj : 1 + dj + width]
+
+    new = inner = at(cost, 0, 0)
+    for k in range(8):
+        edge = at(edges[k], 0, 0) if k < len(edges) else at(edges[k - 4], DI[k], DJ[k])
+        new = least(new, at(cost, DI[k], DJ[k]) + edge)
+    return cost.at[1:-1, 1:-1].set(new), jnp.any(new < inner, axis=(0, 1))
+
+
+METHODS = {"line_sweep": line_sweep, "wavefront": wavefront}
 
 
 def default_method() -> str:
     """A CPU wants little work (line sweeps), an accelerator little depth (wavefront)."""
     return "line_sweep" if jax.default_backend() == "cpu" else "wavefront"
+
+
+def settle(method, edges, goal_ij):
+    """Relax until nothing changes: (cost [H, W, B], steps until nothing changed [B], converged [B]).
+
+    Every step settles one more cell of each least path at least, and every pass of line sweeps a row's worth
+    and more, so that H * W steps always do; the bound is there for input that no argument covers.
+    """
+    height, width, batch = edges[0].shape
+    relax = one_function(METHODS[method]) if method == "line_sweep" else METHODS[method]
+    rows, columns = (lax.broadcasted_iota(jnp.int32, (height, width, 1), a) for a in (0, 1))
+    inside = (goal_ij >= 0).all(-1) & (goal_ij[:, 0] < height - 2) & (goal_ij[:, 1] < width - 2)
+    start = inside & (rows == goal_ij[:, 0] + 1) & (columns == goal_ij[:, 1] + 1)
+    start = jnp.where(start, 0.0, jnp.inf).astype(edges[0].dtype)
+
+    def again(state):
+        _, changed, _, step = state
+        return (jnp.any(changed) & (step < height * width)) | (step < 2)
+
+    def body(state):
+        cost, _, steps, step = state
+        cost, changed = relax(edges, cost, step)
+        return cost, changed, jnp.where(changed, step + 1, steps), step + 1
+
+    state = start, jnp.ones((batch,), bool), jnp.zeros((batch,), jnp.int32), jnp.int32(0)
+    cost, changed, steps, _ = lax.while_loop(again, body, state)
+    return cost[1:-1, 1:-1], steps, ~changed

@@ -11,7 +11,7 @@ from jax import lax
 from jaxtyping import Array, Bool, Float, Int, Int8
 
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, blocked_cells, move_cost
+from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, cell_kinds, kind_cost, move_kind
 
 TIE = 1e-6  # relative: ways whose costs differ by less are equally good; ten roundings of a float32
 
@@ -70,15 +70,15 @@ def next_step(
     def step(state, _):
         ij, heading = state
         around = ij[:, None] + offsets
-        near = cell(classes, around, int(Cell.OBSTACLE)), cell(levels, around, 0)
-        here = cell(classes, ij[:, None], int(Cell.OBSTACLE))[:, 0], cell(levels, ij[:, None], 0)[:, 0]
-        blocked = blocked_cells(near[0].T, rules)
+        classes_near = jnp.concatenate([cell(classes, around, int(Cell.OBSTACLE)), cell(classes, ij[:, None], 0)], 1)
+        kinds = cell_kinds(classes_near.T, rules)  # [9, B]: the eight neighbours and the cell itself
+        levels_near, here = cell(levels, around, 0).T, (kinds[8], cell(levels, ij[:, None], 0)[:, 0])
         moves = []
         for k in range(8):
             # the orthogonal neighbours of an oblique direction are the directions next to it
-            sides = (blocked[(k - 1) % 8], blocked[(k + 1) % 8])
-            ends = (blocked_cells(here[0], rules), *here), (blocked[k], near[0][:, k], near[1][:, k])
-            moves.append(move_cost(k, *ends, *sides, costs, rules))
+            sides = (kinds[k - 1], kinds[(k + 1) % 8]) if k % 2 else None
+            kind = move_kind(here, (kinds[k], levels_near[k]), sides, rules.corner_cutting)
+            moves.append(kind_cost(kind, costs, sides is not None))
         own, ahead = cell(field_cost, ij[:, None], jnp.inf), cell(field_cost, around, jnp.inf)
         direction = pick(jnp.stack(moves, -1) + ahead, ahead < own, heading)
         moved = jnp.where(direction[:, None] >= 0, ij + offsets[direction], ij)
