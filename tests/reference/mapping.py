@@ -12,7 +12,8 @@ import numpy as np
 
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.gridmap import FOOTPRINT_POINTS, GridMap
-from jaxbiped.mapping.leveling import PIXEL_SD, PRIOR_OFFSET, PRIOR_PIXELS, PRIOR_SLOPE, ROUNDS
+from jaxbiped.mapping.leveling import PIXEL_SD, PRIOR_OFFSET, PRIOR_PIXELS, PRIOR_SLOPE, ROUNDS, SAMPLE
+from jaxbiped.sensing.view import View
 
 
 def empty(spec):
@@ -159,7 +160,11 @@ def mark_footprint(grid_map, x, y, level, radius, spec):
 def level_view(view, support, params, spec):
     """Floor-plane refit by `numpy.linalg.lstsq` in double precision; the package's rounds and prior."""
     numbers = np.stack([view.x, view.y, view.z, view.weight]).astype(float)
+    stride = max(1, numbers.shape[1] // SAMPLE)
+    stride += stride % 2 == 0
+    numbers = numbers[:, ::stride]
     x, y, z, pixels = numbers[:, np.isfinite(numbers).all(0) & (numbers[3] > 0)]
+    pixels = pixels * stride
     features = np.stack([np.ones_like(x), x, y], -1)
     grounds = np.arange(spec.ground_levels) - support  # relative to where the robot stands
 
@@ -182,8 +187,13 @@ def level_view(view, support, params, spec):
     steep, high = np.hypot(*plane[1:]) >= params.refit_slope, abs(plane[0]) >= params.refit_offset
     if steep or high or pixels[on_floor].sum() < params.refit_points:
         return view
-    with np.errstate(invalid="ignore"):
-        return replace(view, z=np.float32(view.z - (plane[0] + plane[1] * view.x + plane[2] * view.y)))
+    offset, slope_x, slope_y = plane
+    turned = (
+        view.x + slope_x * view.z,
+        view.y + slope_y * view.z,
+        view.z - (offset + slope_x * view.x + slope_y * view.y),
+    )
+    return View(*np.float32(turned), view.weight)
 
 
 def truth_grid(boxes, spec, body, samples=5, least_share=0.05):
