@@ -9,6 +9,7 @@ import matplotlib.patches as patches
 import numpy as np
 from jaxtyping import Float
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D, Transform
 from PIL import Image
@@ -16,7 +17,9 @@ from PIL import Image
 from jaxbiped.files import write_whole
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.report.pictures import (
+    BUMP_SHADES,
     CENTIMETRES,
+    COLOURS,
     GOAL_RADIUS,
     INK,
     MOST_CELLS_LINED,
@@ -38,7 +41,7 @@ FIELD_OF_VIEW = math.radians(97)  # across, of the stereo camera
 VIEW_RANGE = 0.60  # [m] drawn; the camera sees farther
 WIDTH = 6.4  # [inch] of the figure
 FRAMES_PER_SECOND, LAST_FRAME = 5, 2.0  # [1/s], [s]
-COLOURS = 128  # of the palette, shared by all frames
+COMMON_COLOURS = 120  # of the palette, besides the map's own
 
 
 class Scene:
@@ -82,7 +85,7 @@ class Scene:
         """What moves, at the origin of the robot's frame: view, track, plan, the robot and its belief."""
         ax, k = self.ax, self.k
         half = math.degrees(FIELD_OF_VIEW) / 2
-        wedge = patches.Wedge((0, 0), VIEW_RANGE * k, -half, half, fc="#ffe14d40", ec="#c79a00b0", lw=1.0, zorder=3.5)
+        wedge = patches.Wedge((0, 0), VIEW_RANGE * k, -half, half, fc="#ffe14d2c", ec="#c79a00b0", lw=1.0, zorder=3.5)
         self.view = ax.add_patch(wedge)
         (self.track,) = ax.plot([], [], color=TRACK, lw=1.6, marker="o", ms=2.5, zorder=5)
         (self.plan,) = ax.plot([], [], color=PLAN, lw=2.2, marker=".", ms=5, zorder=6)
@@ -138,7 +141,13 @@ def save_gif(path: str | Path, log: MissionLog, *, title: str = "", dpi: int = 9
 
 
 def shared_palette(frames: list[Image.Image]) -> Image.Image:
-    """One palette for all frames, from the first, the middle and the last: colours do not flicker."""
-    picked = [frames[0], frames[len(frames) // 2], frames[-1]]
-    strip = np.concatenate([np.asarray(frame) for frame in picked])
-    return Image.fromarray(strip).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
+    """One palette for all frames: the map's own colours, and the commonest others of three frames.
+
+    One for all, so that colours do not flicker; the map's own, so that a class seen in a few cells keeps its colour.
+    """
+    strip = np.concatenate([np.asarray(frame) for frame in (frames[0], frames[len(frames) // 2], frames[-1])])
+    common = Image.fromarray(strip).quantize(COMMON_COLOURS, method=Image.Quantize.MEDIANCUT).getpalette()
+    own = [round(255 * channel) for colour in (*COLOURS.values(), *BUMP_SHADES) for channel in to_rgb(colour)]
+    palette = Image.new("P", (1, 1))
+    palette.putpalette((own + common)[: 3 * 256])
+    return palette

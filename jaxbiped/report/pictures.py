@@ -144,7 +144,7 @@ def mark_patch(mark: Mark, k: float) -> patches.Patch:
     """A landmark: a red disc or a blue square, as in the paper."""
     x, y = mark.xy[0] * k, mark.xy[1] * k
     if mark.kind == "circle":
-        return patches.Circle((x, y), DISC_RADIUS * k, fc="#ff3b30", ec="white", alpha=0.55, lw=0.8, zorder=2.5)
+        return patches.Circle((x, y), DISC_RADIUS * k, fc="#ff3b3028", ec="#ff3b30", lw=1.3, zorder=2.5)
     side, corner = SQUARE_SIDE * k, SQUARE_SIDE * k / 2
     angle = math.degrees(mark.yaw)
     return patches.Rectangle(
@@ -185,7 +185,7 @@ def save_map(path: str | Path, grid: ClassGrid, *, title: str = "", **what) -> N
     """A PNG of one map; `what` goes to `draw_map`."""
     rows, columns = grid.shape
     width = 7.0
-    figure = Figure(figsize=(width, float(np.clip(width * rows / columns, 2.5, 10)) + 1.0), layout="constrained")
+    figure = Figure(figsize=(width, float(np.clip(width * rows / columns, 2.5, 10)) + 0.7), layout="constrained")
     ax = figure.subplots()
     draw_map(ax, grid, **what)
     ax.set_title(title, fontsize=10)
