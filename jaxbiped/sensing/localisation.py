@@ -1,4 +1,4 @@
-"""Where the robot believes it stands: an extended Kalman filter over (x, y, yaw), shared by all sensors.
+"""Where the robot believes it stands: an iterated extended Kalman filter over (x, y, yaw), shared by all sensors.
 
 Odometry predicts, landmarks of known place correct (paper, 2.1). Each landmark seen is one observation of two numbers,
 so that a single one, which fixes no pose by itself, still counts.
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from jaxbiped.arenas.arena import Landmarks
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
@@ -18,6 +18,7 @@ from jaxbiped.geometry.small import matrix, product
 from jaxbiped.sensing.view import Sightings
 
 GATE = 18.4  # squared Mahalanobis distance with two degrees of freedom: one good sighting in 10,000 is refused
+ROUNDS = 3  # of linearising
 LEAST_VARIANCE = 1e-8  # [m^2] of a sighting: keeps the innovation invertible in float32
 
 
@@ -56,35 +57,48 @@ def predict(
 
 
 def correct(belief: Belief, landmarks: Landmarks, sightings: Sightings) -> Belief:
-    """The belief after the landmarks seen, one after the other, each linearised about what those before it gave.
+    """The belief after the landmarks seen, fused one after the other.
 
-    Sightings that disagree with the belief by more than `GATE` are refused. Unseen slots, and sightings that are not
-    finite, change nothing.
+    Iterated: what is seen is linearised about the believed pose first, and then anew about the pose that comes of
+    it, since after a long way without landmarks a heading may be some degrees off. Sightings that disagree with the
+    belief by more than `GATE` are refused. Unseen slots, and sightings that are not finite, change nothing.
     """
-
-    def fuse(belief: Belief, slot) -> tuple[Belief, None]:
-        landmark_x, landmark_y, used, seen_x, seen_y, sd, seen = slot
-        pose, P = belief.pose, belief.cov
-        expected_x, expected_y = to_robot(pose, landmark_x, landmark_y)
-        cos, sin = jnp.cos(pose.yaw), jnp.sin(pose.yaw)
-        H = matrix(((-cos, -sin, expected_y), (sin, -cos, -expected_x)))
-        R = jnp.maximum(sd * sd, LEAST_VARIANCE) * jnp.eye(2)
-        PHt = product(P, H.T)
-        S = product(H, PHt) + R
-        determinant = S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0]
-        S_inverse = matrix(((S[1, 1], -S[0, 1]), (-S[1, 0], S[0, 0]))) / determinant
-        innovation = jnp.stack([seen_x - expected_x, seen_y - expected_y])
-        distance = jnp.sum(innovation * jnp.sum(S_inverse * innovation, axis=1))
-        K = product(PHt, S_inverse)
-        step = jnp.sum(K * innovation, axis=1)
-        rest = jnp.eye(3) - product(K, H)
-        cov = product(product(rest, P), rest.T) + product(product(K, R), K.T)  # Joseph's form stays positive
-        good = used & seen & (distance <= GATE) & jnp.all(jnp.isfinite(cov))
-        x, y, yaw = pose.x + step[0], pose.y + step[1], wrap_angle(pose.yaw + step[2])
-        pose = Pose(
-            x=jnp.where(good, x, pose.x), y=jnp.where(good, y, pose.y), z=pose.z, yaw=jnp.where(good, yaw, pose.yaw)
-        )
-        return Belief(pose, jnp.where(good, cov, P)), None
-
     slots = (landmarks.x, landmarks.y, landmarks.used, sightings.x, sightings.y, sightings.sd, sightings.seen)
-    return jax.lax.scan(fuse, belief, slots)[0]
+
+    def once(about: Belief, _) -> tuple[Belief, None]:
+        return jax.lax.scan(lambda state, slot: (fuse(state, about.pose, *slot), None), belief, slots)[0], None
+
+    return jax.lax.scan(once, belief, length=ROUNDS)[0]
+
+
+def fuse(
+    belief: Belief,
+    about: Pose,
+    landmark_x: Float[Array, ""],
+    landmark_y: Float[Array, ""],
+    used: Bool[Array, ""],
+    seen_x: Float[Array, ""],
+    seen_y: Float[Array, ""],
+    sd: Float[Array, ""],
+    seen: Bool[Array, ""],
+) -> Belief:
+    """The belief after one sighting of one landmark, linearised about a pose."""
+    pose, P = belief.pose, belief.cov
+    x, y = to_robot(about, landmark_x, landmark_y)
+    cos, sin = jnp.cos(about.yaw), jnp.sin(about.yaw)
+    H = matrix(((-cos, -sin, y), (sin, -cos, -x)))
+    off = jnp.stack([pose.x - about.x, pose.y - about.y, wrap_angle(pose.yaw - about.yaw)])
+    innovation = jnp.stack([seen_x - x, seen_y - y]) - jnp.sum(H * off, axis=1)
+    R = jnp.maximum(sd * sd, LEAST_VARIANCE) * jnp.eye(2)
+    PHt = product(P, H.T)
+    S = product(H, PHt) + R
+    determinant = S[0, 0] * S[1, 1] - S[0, 1] * S[1, 0]
+    S_inverse = matrix(((S[1, 1], -S[0, 1]), (-S[1, 0], S[0, 0]))) / determinant
+    distance = jnp.sum(innovation * jnp.sum(S_inverse * innovation, axis=1))
+    K = product(PHt, S_inverse)
+    step = jnp.sum(K * innovation, axis=1)
+    rest = jnp.eye(3) - product(K, H)
+    cov = product(product(rest, P), rest.T) + product(product(K, R), K.T)  # Joseph's form stays positive
+    good = used & seen & (distance <= GATE) & jnp.all(jnp.isfinite(cov))
+    moved = Pose(pose.x + step[0], pose.y + step[1], pose.z, wrap_angle(pose.yaw + step[2]))
+    return jax.tree.map(lambda new, old: jnp.where(good, new, old), Belief(moved, cov), belief)

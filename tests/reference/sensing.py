@@ -13,7 +13,7 @@ from jaxbiped.arenas.arena import SQUARE
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.sensing import Belief, Sightings, View, hashing
 from jaxbiped.sensing.landmarks import LANDMARK
-from jaxbiped.sensing.localisation import GATE, LEAST_VARIANCE
+from jaxbiped.sensing.localisation import GATE, LEAST_VARIANCE, ROUNDS
 from jaxbiped.sensing.noise import ATTITUDE, HIDING_REACH, MATCH, PHANTOM, PHANTOM_BLOCK
 from jaxbiped.sensing.odometry import ODOMETRY
 
@@ -197,19 +197,24 @@ def predict(belief, dx, dy, dyaw, variances):
 
 
 def correct(belief, landmarks, sightings):
-    """The belief after the landmarks seen, one after the other, in float64."""
-    mean, cov = mean_of(belief), np.asarray(belief.cov, float)
-    for k in np.flatnonzero(np.asarray(sightings.seen) & np.asarray(landmarks.used)):
-        c, s = np.cos(mean[2]), np.sin(mean[2])
+    """The belief after the landmarks seen, in float64; each round linearises about the result of the last."""
+    about = mean_of(belief)
+    for _ in range(ROUNDS):
+        mean, cov = mean_of(belief), np.asarray(belief.cov, float)
+        c, s = np.cos(about[2]), np.sin(about[2])
         to_robot = np.array([[c, s], [-s, c]])
-        expected = to_robot @ (np.array([landmarks.x[k], landmarks.y[k]], float) - mean[:2])
-        H = np.column_stack([-to_robot, [expected[1], -expected[0]]])
-        S = H @ cov @ H.T + max(float(sightings.sd[k]) ** 2, LEAST_VARIANCE) * np.eye(2)
-        innovation = np.array([sightings.x[k], sightings.y[k]], float) - expected
-        if not innovation @ np.linalg.solve(S, innovation) <= GATE:
-            continue
-        K = cov @ H.T @ np.linalg.inv(S)
-        mean, cov = mean + K @ innovation, (np.eye(3) - K @ H) @ cov
+        for k in np.flatnonzero(np.asarray(sightings.seen) & np.asarray(landmarks.used)):
+            x, y = to_robot @ (np.array([landmarks.x[k], landmarks.y[k]], float) - about[:2])
+            H = np.column_stack([-to_robot, [y, -x]])
+            off = mean - about
+            off[2] = wrap(off[2])
+            innovation = np.array([sightings.x[k] - x, sightings.y[k] - y], float) - H @ off
+            S = H @ cov @ H.T + max(float(sightings.sd[k]) ** 2, LEAST_VARIANCE) * np.eye(2)
+            if not innovation @ np.linalg.solve(S, innovation) <= GATE:
+                continue
+            K = cov @ H.T @ np.linalg.inv(S)
+            mean, cov = mean + K @ innovation, (np.eye(3) - K @ H) @ cov
+        about = mean
     return belief_of(mean, cov, belief.pose.z)
 
 
@@ -220,7 +225,12 @@ def mean_of(belief):
 
 def belief_of(mean, cov, z):
     """A belief of a mean whose yaw may have left (-pi, pi]."""
-    return Belief(Pose(mean[0], mean[1], z, -((-mean[2] + np.pi) % (2 * np.pi) - np.pi)), cov)
+    return Belief(Pose(mean[0], mean[1], z, wrap(mean[2])), cov)
+
+
+def wrap(angle):
+    """The angle in (-pi, pi]."""
+    return -((-angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def drift(displacement, noise, seed):

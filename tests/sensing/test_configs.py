@@ -1,0 +1,68 @@
+"""Cameras and sensors from TOML: files that say what the constants do, and one clear line about bad ones."""
+
+from pathlib import Path
+
+import pytest
+
+from jaxbiped import config
+from jaxbiped.errors import InputError
+from jaxbiped.sensing import PRESETS, CameraConfig, NoiseConfig, SensorConfig, sensor_preset
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_sensor_files_equal_the_constants(name):
+    path = CONFIGS / "sensors" / f"{name}.toml"
+    assert path.read_text().startswith("#")
+    assert config.load(SensorConfig, path) == PRESETS[name] == sensor_preset(str(path))
+    written = config.load_toml(path)
+    for part in ("stereo", "landmarks"):  # every value is said, none left to defaults
+        assert set(written[part]) == set(type(getattr(PRESETS[name], part)).model_fields)
+
+
+def test_sensor_folder_holds_the_presets_and_nothing_else():
+    assert {path.stem for path in (CONFIGS / "sensors").glob("*.toml")} == set(PRESETS)
+
+
+def test_camera_files():
+    assert config.load(CameraConfig, CONFIGS / "cameras" / "paper.toml") == CameraConfig()
+    narrow = config.load(CameraConfig, CONFIGS / "cameras" / "narrow.toml")
+    assert narrow == CameraConfig(field_of_view=66)
+
+
+def test_the_paper_camera():
+    """97 degrees across 512 px; nearest surface 0.17 m."""
+    camera = CameraConfig().traced()
+    assert abs(float(camera.focal) - 226.49) < 0.01
+    assert abs(float(camera.focal * camera.baseline / camera.max_disparity) - 0.171) < 0.001
+    assert CameraConfig().image.pixels_per_ray == 64
+
+
+@pytest.mark.parametrize(
+    ("model", "data", "words"),
+    [
+        (CameraConfig, {"columns": 60}, "columns must divide the width of 512"),
+        (CameraConfig, {"rows": 0}, "rows"),
+        (CameraConfig, {"field_of_view": 180}, "field_of_view"),
+        (CameraConfig, {"baseline": float("nan")}, "baseline"),
+        (CameraConfig, {"squat_drop": 0.4}, "camera_height of 0.365"),
+        (CameraConfig, {"num_disparities": 100}, "multiple of 16"),
+        (CameraConfig, {"lens": 1}, "unknown key"),
+        (NoiseConfig, {"sd": -0.1}, "sd"),
+        (NoiseConfig, {"drop_edge": 1.1}, "drop_edge"),
+        (NoiseConfig, {"correlation": 0.6}, "correlation"),
+        (NoiseConfig, {"max_range": "far"}, "max_range"),
+        (SensorConfig, {"landmarks": {"nearest": -1}}, "landmarks.nearest"),
+    ],
+)
+def test_bad_values_are_named(model, data, words):
+    with pytest.raises(InputError, match=words):
+        config.parse(model, data, file="my.toml")
+
+
+def test_unknown_preset_lists_the_known():
+    with pytest.raises(InputError, match=r"ideal, rendered, real.*'best'"):
+        sensor_preset("best")
+    with pytest.raises(InputError, match="no such file"):
+        sensor_preset("nowhere.toml")
