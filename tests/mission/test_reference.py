@@ -1,0 +1,71 @@
+"""The compiled loop against the plain one: same arena, same seed, same noise, same decisions."""
+
+import numpy as np
+import pytest
+
+from jaxbiped.mission.outcome import Code
+from tests.mission.conftest import PROGRAM
+from tests.reference import mission as reference
+
+# Sums of a hundred float32 terms, and commands computed from poses that are off by as much.
+METRES, SECONDS, RADIANS = 1e-4, 0.01, 1e-3
+# A point within 1e-7 m of a voxel's border may fall on either side, and then a cell may be classed otherwise. Missions
+# that part over such a cell may be this share of all. (None of the first 88 that were tried did.)
+MAY_PART = 0.1
+BORDER_POINTS = 1e-3  # share of all points that lay at such borders, at most, when two missions parted
+
+
+@pytest.fixture(scope="session")
+def plain(population):
+    """The population's missions by the reference."""
+    arenas, settings, seeds, _ = population
+    return [reference.run(*each, PROGRAM, keep=True) for each in zip(arenas, settings, seeds, strict=True)]
+
+
+def same_command(step, log, t, k):
+    """Whether the t-th commands of both are the same but for rounding."""
+    ours, theirs = log.command, step.command
+    discrete = all(getattr(ours, name)[t, k] == getattr(theirs, name) for name in ("primitive", "rise", "squat"))
+    return discrete and abs(ours.turn[t, k] - theirs.turn) < RADIANS and abs(ours.length[t, k] - theirs.length) < METRES
+
+
+def parted_at(mission, log, k):
+    """The first decision at which the two differ, None where there is none."""
+    count = min(len(mission.steps), int(log.running[:, k].sum()))
+    return next((t for t in range(count) if not same_command(mission.steps[t], log, t, k)), None)
+
+
+def test_missions_are_the_same(population, plain, played):
+    parted = []
+    for k, mission in enumerate(plain):
+        same = played.code[k] == mission.code and played.decisions[k] == mission.decisions
+        same &= abs(played.distance[k] - mission.distance) < METRES and abs(played.time[k] - mission.time) < SECONDS
+        if not same:
+            parted.append((k, population[3][k], Code(mission.code).name, Code(int(played.code[k])).name))
+    assert len(parted) <= MAY_PART * len(plain), parted
+    assert {mission.code for mission in plain} >= {Code.REACHED, Code.NO_PATH, Code.STUCK}
+
+
+def test_maps_and_commands_are_the_same_until_a_point_lies_on_a_border(plain, stepped):
+    decisions = clean = 0
+    for k, mission in enumerate(plain):
+        at = parted_at(mission, stepped, k)
+        for t, step in enumerate(mission.steps[:at]):
+            moved = np.abs(step.votes - stepped.votes[t, k]).sum() / step.votes.sum()
+            assert moved < BORDER_POINTS, (k, t)
+            other = (step.classes != stepped.classes[t, k]) | (step.levels != stepped.levels[t, k])
+            assert not other.any() or moved > 0, (k, t)
+            decisions, clean = decisions + 1, clean + (moved == 0)
+        if at is not None:
+            step = mission.steps[at]
+            assert np.any(step.classes != stepped.classes[at, k]), (k, at, "same map, other command")
+            assert np.abs(step.votes - stepped.votes[at, k]).sum() / step.votes.sum() < BORDER_POINTS, (k, at)
+    assert clean > 0.8 * decisions > 300  # most maps are the same to the last point
+
+
+def test_all_strategies_and_families_took_part(population, plain):
+    arenas, _, _, names = population
+    assert len(set(names)) == 5
+    assert len({int(arena.family) for arena in arenas}) == 6
+    assert any(step.command.rise for mission in plain for step in mission.steps)
+    assert any(step.command.squat for mission in plain for step in mission.steps)
