@@ -1,0 +1,127 @@
+"""`summary.md`: the question, its answer, tables and figures of a results folder, written anew from its rows."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from jaxbiped.errors import InputError
+from jaxbiped.files import write_whole
+from jaxbiped.report.answer import answer
+from jaxbiped.report.figures import write_figures
+from jaxbiped.report.tables import markdown_sheets, to_markdown
+from jaxbiped.report.words import number
+from jaxbiped.study import ALL, QUESTION, Comparison, Manifest, compare, read, sample_size
+
+SUMMARY = "summary.md"
+QUESTION_TEXT = "When, and by how much, does bump-aware planning beat floor-only planning?"
+
+LIMITATIONS = (
+    "Distance and time are compared on arenas that both strategies solved. These are not a random sample of the "
+    "arenas: the harder one is left out wherever one of the two fails, so the differences hold for solved arenas only.",
+    "The arenas come from the families of this program; a rate over all families depends on their mix.",
+    "McNemar's test is exact and the interval of the difference is asymptotic, so that an interval can just leave out "
+    "zero where the corrected p-value is above 0.05. A difference is called shown only when both say so.",
+    "Wilcoxon's test asks about ranks, the interval about a mean. Where they point different ways nothing is claimed.",
+    "Strata are corrected among themselves, each kind (families, thirds of difficulty) apart from the overall table.",
+    "That no difference is shown does not say that there is none: see the intervals.",
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a report is made of."""
+
+    folder: Path
+    comparison: Comparison
+    manifest: Manifest
+    answer: tuple[str, ...]  # sentences, most important first
+    files: tuple[Path, ...]  # written: summary and figures
+
+
+def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -> Report:
+    """Read a results folder, compare its strategies, and write its figures and `summary.md` into it.
+
+    May be called again at any time: the same rows give the same report. Seeds the bootstraps with the study's seed.
+
+    Args:
+      point: the sweep point to report on.
+      resamples: of the bootstraps.
+
+    Raises:
+      InputError: no results, damaged results, no rows, or files that cannot be written.
+    """
+    folder = Path(folder)
+    frame, manifest = read(folder)
+    if frame.is_empty():
+        raise InputError("has no rows to report on yet", file=folder)
+    comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
+    figures = write_figures(folder, frame, comparison)
+    text = summary(comparison, manifest, figures)
+    write_whole(folder / SUMMARY, lambda file: file.write(text.encode()))
+    files = tuple(folder / name for name in (SUMMARY, *figures))
+    return Report(folder, comparison, manifest, answer(comparison), files)
+
+
+def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str]) -> str:
+    """The text of `summary.md`.
+
+    Args:
+      figures: file names beside the summary, with captions.
+    """
+    lines = ["# Strategies compared", ""]
+    done = comparison.summary(comparison.strategies[0]).n
+    if manifest.state != "finished":
+        lines += [f"**This study is not finished: it has {done} of {manifest.arenas} arenas.**", ""]
+    sentences = answer(comparison)
+    if sentences:
+        lines += [f"**{QUESTION_TEXT}**", "", f"**{sentences[0]}**", "", *(f"- {text}" for text in sentences[1:]), ""]
+        lines += [pilot(comparison), ""]
+    for name, caption in figures.items():
+        lines += [f"![{caption}]({name})", "", f"*{caption}*", ""]
+    lines += ["## Tables", ""]
+    for sheet in markdown_sheets(comparison):
+        lines += [to_markdown(sheet)]
+    lines += ["## Limitations", "", *(f"- {text}" for text in LIMITATIONS), ""]
+    return "\n".join(lines + provenance(comparison, manifest))
+
+
+def pilot(comparison: Comparison) -> str:
+    """How many arenas would show the observed difference in success, for who plans the next study."""
+    pair = comparison.pair(*QUESTION, ALL)
+    first, second = pair.first_only / pair.success.n, pair.second_only / pair.success.n
+    text = f"Only {pair.first} reached the goal on {pair.first_only} arenas, only {pair.second} on {pair.second_only}."
+    if first == second:
+        return text
+    n = sample_size(first, second, power=0.8)
+    return f"{text} Were these the true shares, {n} arenas would show the difference with a power of 80 % (McNemar)."
+
+
+def provenance(comparison: Comparison, manifest: Manifest) -> list[str]:
+    """Where the numbers come from, so that anyone can make them again."""
+    versions = ", ".join(f"{name} {version}" for name, version in manifest.versions.items())
+    speed = ""
+    if manifest.wall_time and manifest.rows:
+        speed = f" ({manifest.rows / manifest.wall_time:.0f} missions a second, compilation included)"
+    config = json.dumps(manifest.config, indent=2, sort_keys=True)
+    return [
+        "## How it was made",
+        "",
+        f"- Command: `{manifest.command}`",
+        f"- Config hash: `{manifest.config_hash}`; seed {manifest.seed}; started {manifest.started}",
+        f"- Wall time: {number(manifest.wall_time, 1)} s{speed}; compilation: {number(manifest.compile_time, 1)} s",
+        f"- Device: {manifest.device}",
+        f"- Versions: {versions}",
+        f"- Sweep point {comparison.point}; bootstraps of {comparison.resamples} resamples, seed {comparison.seed}",
+        "- Rows: `rows/*.parquet`, one for each arena and strategy; the manifest beside them: `manifest.json`",
+        "",
+        "<details><summary>Resolved configuration</summary>",
+        "",
+        "```json",
+        config,
+        "```",
+        "",
+        "</details>",
+        "",
+    ]

@@ -1,0 +1,218 @@
+"""Tables of a comparison, for the terminal and for markdown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rich import box
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from jaxbiped.report.answer import ALPHA, DISTANCE, MEASURES, SUCCESS, TIME, Measure, answer, part
+from jaxbiped.report.words import NONE, brackets, number, p_cell, percent, signed
+from jaxbiped.study import ALL, CODES, QUESTION, Comparison, PairComparison, PairedMetric
+
+Row = tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A table of text, ready to be shown anywhere. The first column is left-aligned, the others right-aligned."""
+
+    title: str
+    columns: Row
+    groups: tuple[tuple[Row, ...], ...]  # rows, in groups that a line divides
+    notes: tuple[str, ...] = ()
+
+
+def to_rich(sheet: Sheet) -> Table:
+    """For the terminal."""
+    table = Table(
+        title=sheet.title,
+        title_justify="left",
+        title_style="bold",
+        caption="\n".join(sheet.notes) or None,
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        show_edge=False,
+    )
+    for index, column in enumerate(sheet.columns):
+        table.add_column(column, justify="right" if index else "left", no_wrap=index == 0, overflow="fold")
+    for group in sheet.groups:
+        for row in group:
+            table.add_row(*row)
+        table.add_section()
+    return table
+
+
+def to_markdown(sheet: Sheet) -> str:
+    """For `summary.md`, title and notes included."""
+    lines = [f"### {sheet.title}", ""]
+    rules = [":--"] + ["--:"] * (len(sheet.columns) - 1)
+    rows = [sheet.columns, tuple(rules), *(row for group in sheet.groups for row in group)]
+    for row in rows:
+        cells = [f"**{row[0]}**", *row[1:]] if not any(row[1:]) else row  # a group's own heading
+        lines.append("| " + " | ".join(" ".join(cell.split()) for cell in cells) + " |")
+    return "\n".join([*lines, "", *(f"{note}  " for note in sheet.notes)]).rstrip() + "\n"
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """The pairs of a comparison over all arenas, for the terminal."""
+    return to_rich(pair_sheet(comparison, detailed=1))
+
+
+def terminal(comparison: Comparison) -> Group:
+    """What a comparison prints, 80 columns wide: strategies, failures, pairs, the question by family, the answer."""
+    sheets = [strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison, detailed=1)]
+    if comparison.pair(*QUESTION) is not None and len(comparison.strata("family")) > 1:
+        sheets.append(short_stratum_sheet(comparison, *QUESTION, "family"))
+    blocks: list[RenderableType] = []
+    for sheet in sheets:
+        if sheet.groups:
+            blocks += [to_rich(sheet), ""]
+    return Group(*blocks, *(Text(sentence) for sentence in answer(comparison)))
+
+
+def markdown_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
+    """All tables of a comparison, in the order of `summary.md`."""
+    sheets = [strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison)]
+    pairs = dict.fromkeys((pair.first, pair.second) for pair in comparison.pairs)
+    for kind in ("family", "difficulty"):
+        if len(comparison.strata(kind)) > 1:
+            sheets.append(success_sheet(comparison, kind))
+            sheets += [stratum_sheet(comparison, first, second, kind) for first, second in pairs]
+    return tuple(sheet for sheet in sheets if sheet.groups)
+
+
+def strategy_sheet(comparison: Comparison) -> Sheet:
+    """Each strategy by itself: success with its interval, and the mean distance and time of its reached missions."""
+    summaries = [comparison.summary(name) for name in comparison.strategies]
+    rows = []
+    for item in summaries:
+        cells = (item.strategy, percent(item.success.estimate), brackets(item.success, 100.0, sign=False))
+        cells += (percent(item.reachable.estimate), percent(item.success_of_reachable.estimate))
+        rows.append((*cells, scaled(item.distance.estimate, DISTANCE, 1), scaled(item.time.estimate, TIME, 1)))
+    columns = (
+        "strategy",
+        "reached %",
+        f"{100 * comparison.level:g} % interval",
+        "plan\nexists %",
+        "reached\nof these %",
+    )
+    return Sheet(
+        f"Strategies on {summaries[0].n} arenas",
+        (*columns, "distance\ncm", "time\nmin"),
+        (tuple(rows),),
+        (
+            "Wilson intervals. A plan exists: with perfect knowledge of the arena, for this strategy.",
+            "Distance and time: means over a strategy's own reached missions, so over different arenas.",
+        ),
+    )
+
+
+def code_sheet(comparison: Comparison) -> Sheet:
+    """How the missions of each strategy ended; codes that never came are left out."""
+    summaries = [comparison.summary(name) for name in comparison.strategies]
+    seen = [i for i in range(len(CODES)) if any(item.codes[i] for item in summaries)]
+    rows = tuple((item.strategy, *(str(item.codes[i]) for i in seen)) for item in summaries)
+    return Sheet("How missions ended", ("strategy", *(CODES[i].replace("_", " ") for i in seen)), (rows,))
+
+
+def scaled(value: float | None, measure: Measure, digits: int) -> str:
+    """An SI value in the measure's unit."""
+    return number(None if value is None else value * measure.scale, digits)
+
+
+def pair_sheet(comparison: Comparison, detailed: int | None = None) -> Sheet:
+    """Pairs of strategies over all arenas: differences with intervals and corrected p-values.
+
+    Args:
+      detailed: how many of the pairs have medians and probabilities too; all by default.
+    """
+    pairs = [pair for pair in comparison.pairs if pair.stratum == ALL]
+    columns = ("first - second", "arenas", "difference", f"{100 * comparison.level:g} % interval", "p (Holm)")
+    detailed = len(pairs) if detailed is None else detailed
+    groups = tuple(tuple(pair_rows(pair, index < detailed)) for index, pair in enumerate(pairs))
+    return Sheet("Pairs of strategies on the same arenas", columns, groups, PAIR_NOTES)
+
+
+PAIR_NOTES = (
+    "Success: Tango's score interval, McNemar's exact test. Distance and time: on arenas that both solved; BCa "
+    "bootstrap intervals; Wilcoxon's signed-rank test (zeros ranked, then left out: Pratt).",
+    "Differences are first minus second: a negative distance or time says that the first is shorter or faster. "
+    "P(shorter), P(faster): the probability that the first is, ties counted half.",
+    "p-values are corrected by Holm's method for all tests of the table.",
+)
+
+
+def pair_rows(pair: PairComparison, detailed: bool) -> list[Row]:
+    """One pair as rows: success, then the mean of each metric; with details its median and probability too."""
+    success = pair.success
+    value = signed(100 * success.estimate if success.valid else None, 1)
+    rows = [(f"{pair.first} - {pair.second}", "", "", "", "")]
+    rows.append(("  success, points", str(success.n), value, brackets(success, 100.0), p_cell(success.p_holm)))
+    for measure, better in ((DISTANCE, "  P(shorter), %"), (TIME, "  P(faster), %")):
+        metric: PairedMetric = getattr(pair, measure.name)
+        estimates = [(f"  {measure.name}, {measure.unit}", metric.mean, p_cell(metric.p_holm))]
+        if detailed:
+            estimates.append((f"  {measure.name}, median", metric.median, ""))
+        for label, estimate, p in estimates:
+            value = signed(estimate.estimate * measure.scale if estimate.valid else None, measure.digits)
+            rows.append((label, str(metric.n), value, brackets(estimate, measure.scale, measure.digits), p))
+        if detailed:
+            chance = metric.improvement
+            limits = brackets(chance, 100.0, 0, sign=False)
+            rows.append((better, str(metric.n), percent(chance.estimate, 0), limits, f"{metric.zeros} ties"))
+    return rows
+
+
+def short_stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
+    """One pair in every stratum of a kind, narrow enough for a terminal: a star instead of a p-value."""
+    rows = []
+    for stratum in (ALL, *comparison.strata(kind)):
+        pair = comparison.pair(first, second, stratum)
+        cells = []
+        for measure, digits in ((SUCCESS, 0), (DISTANCE, 0), (TIME, 1)):
+            estimate, p = part(pair, measure)
+            value = signed(estimate.estimate * measure.scale if estimate.valid else None, digits)
+            limits = brackets(estimate, measure.scale, digits)
+            star = "*" if p is not None and p < ALPHA else " "
+            cells.append((value if limits == NONE else f"{value} {limits}") + star)
+        rows.append((stratum.name, str(pair.success.n), cells[0], str(pair.time.n), *cells[1:]))
+    columns = (kind, "arenas", "success, points", "both", "distance, cm", "time, min")
+    notes = (f"Mean differences, first minus second, with intervals. *: p < {ALPHA:g} after Holm's correction.",)
+    return Sheet(f"{first} - {second} by {kind}", columns, (tuple(rows[:1]), tuple(rows[1:])), notes)
+
+
+def stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
+    """One pair in every stratum of a kind: a row each."""
+    pairs = [comparison.pair(first, second, stratum) for stratum in (ALL, *comparison.strata(kind))]
+    rows = []
+    for pair in pairs:
+        cells = (pair.stratum.name,)
+        for measure in MEASURES:
+            estimate, p = part(pair, measure)
+            value = signed(estimate.estimate * measure.scale if estimate.valid else None, measure.digits)
+            limits = brackets(estimate, measure.scale, measure.digits)
+            cells += (str(estimate.n), value if limits == NONE else f"{value} {limits}", p_cell(p))
+        rows.append(cells)
+    columns = (kind,)
+    for measure in MEASURES:
+        columns += ("arenas" if measure is SUCCESS else "both", f"{measure.name}, {measure.unit}", "p")
+    notes = (f"Differences, first minus second; p-values corrected by Holm's method within {kind} tables.",)
+    return Sheet(f"{first} - {second} by {kind}", columns, (tuple(rows[:1]), tuple(rows[1:])), notes)
+
+
+def success_sheet(comparison: Comparison, kind: str) -> Sheet:
+    """Success of every strategy in every stratum of a kind."""
+    rows = []
+    for stratum in comparison.strata(kind):
+        summaries = [comparison.summary(name, stratum) for name in comparison.strategies]
+        cells = [
+            f"{percent(item.success.estimate)} {brackets(item.success, 100.0, 0, sign=False)}" for item in summaries
+        ]
+        rows.append((stratum.name, str(max(item.n for item in summaries)), *cells))
+    columns = (kind, "arenas", *comparison.strategies)
+    return Sheet(f"Success in % by {kind}", columns, (tuple(rows),), ("Wilson intervals.",))
