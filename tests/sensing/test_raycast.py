@@ -123,6 +123,17 @@ def test_look_and_squat_agree_with_plain_numpy():
         assert (np.abs(views.z[k] - reference.measure_raycast(*args).z) <= 1e-4).mean() >= 0.999
 
 
+def test_views_do_not_depend_on_their_batch_and_presets_compile_once():
+    noise = PRESETS["rendered"].stereo.traced()
+    few, many = as_numpy(measure(SCENES[:4], noise)), as_numpy(measure(SCENES, noise))
+    for name in ("x", "y", "z", "weight"):
+        assert np.array_equal(getattr(few, name), getattr(many, name)[:4])
+    compiled = measure_all._cache_size()
+    for preset in PRESETS.values():
+        measure(SCENES, preset.stereo.traced())
+    assert measure_all._cache_size() == compiled
+
+
 def test_ideal_points_lie_on_true_surfaces():
     """In the robot frame: the floor at z = 0 below the robot's own surface, a wall where it stands."""
     view = as_numpy(
@@ -152,7 +163,7 @@ def test_looking_down_sees_the_feet_and_squatting_lowers_the_eye():
 def test_attitude_tilts_the_points():
     """A robot that leans forward by an angle sees a level floor come up by as much: z = tan(angle) x."""
     arena, where = make(), pose()
-    noise = PRESETS["ideal"].model_copy(update={}).stereo.model_copy(update={"attitude_sd": 1.0}).traced()
+    noise = PRESETS["ideal"].stereo.model_copy(update={"attitude_sd": 1.0}).traced()
     views = as_numpy(measure([(arena, where)] * 200, noise))
     slopes = []
     for x, y, z, weight in zip(views.x, views.y, views.z, views.weight, strict=True):
