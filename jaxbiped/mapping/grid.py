@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass
 
 import jax
@@ -45,22 +46,23 @@ class GridSpec:
 
     def __post_init__(self):
         for name in ("size_x", "size_y"):
-            cells = getattr(self, name) / self.pitch
-            if round(cells) < 1 or abs(cells - round(cells)) > 1e-6 * max(cells, 1.0):
-                raise InputError(
-                    f"must divide the area's {name} of {getattr(self, name):g} m", field="pitch", value=self.pitch
-                )
-
-        if not -8 <= self.lowest <= 0:
-            raise InputError("must lie between -8 and 0", field="lowest", value=self.lowest)
-        if not 1 <= self.ground_levels <= 8:
-            raise InputError("must lie between 1 and 8", field="ground_levels", value=self.ground_levels)
-        if not self.ground_levels < self.levels + self.lowest <= 32:
-            raise InputError(
-                "must leave more levels above 0 than ground_levels, and at most 32", field="levels", value=self.levels
-            )
-        if not (self.level_height > 0 and 0 <= self.max_radius <= 64 * self.pitch):
-            raise InputError("needs a positive level_height and a max_radius of at most 64 cells", value=self)
+            size = getattr(self, name)
+            cells = size / self.pitch if self.pitch > 0 else math.nan
+            if not (0.5 < cells < math.inf) or abs(cells - round(cells)) > 1e-6 * cells:
+                raise InputError(f"must divide the area's {name} of {size:g} m", field="pitch", value=self.pitch)
+        allowed = {
+            "lowest": (-8 <= self.lowest <= 0, "from -8 to 0"),
+            "ground_levels": (1 <= self.ground_levels <= 8, "from 1 to 8"),
+            "levels": (
+                self.ground_levels < self.levels + self.lowest <= 32,
+                "at most 32 from level 0 up, and more than ground_levels",
+            ),
+            "level_height": (0 < self.level_height < math.inf, "above 0"),
+            "max_radius": (0 <= self.max_radius <= 64 * self.pitch, "from 0 to 64 cells"),
+        }
+        for name, (good, what) in allowed.items():
+            if not good:
+                raise InputError(f"must be {what}", field=name, value=getattr(self, name))
 
     @property
     def shape(self) -> tuple[int, int]:
