@@ -113,7 +113,7 @@ def read_cells(
     return classes.astype(jnp.int8), ground.astype(jnp.int8)
 
 
-def band(levels, ground: Int[Array, "H W"]) -> UInt32[Array, "H W"]:
+def band(levels: Bool[Array, "32"], ground: Int[Array, "H W"]) -> UInt32[Array, "H W"]:
     """The mask of `levels` (Bool [32]), which are relative to the ground, in absolute levels for each cell."""
     bits = jnp.sum(jnp.where(levels, jnp.uint32(1) << jnp.arange(32, dtype=jnp.uint32), 0), dtype=jnp.uint32)
     return bits << ground.astype(jnp.uint32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
-from jaxtyping import Array, Int, UInt32
+from jaxtyping import Array, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.boxes import Boxes, covers, ground_height
@@ -32,7 +32,7 @@ def truth_grid(arena: Arena, spec: GridSpec, body: Body) -> tuple[Int[Array, "H 
         return places.reshape(height, n, width, n, *places.shape[2:]).mean((1, 3), dtype=jnp.float32)
 
     levels = spec.levels + spec.lowest
-    solid = solid_levels(arena.boxes, x, y, spec)
+    solid = filled_levels(arena.boxes, x, y, spec)
     bits = jnp.arange(levels, dtype=jnp.uint32)
     occupied = share((solid[..., None] >> bits) & 1) > LEAST_SHARE
     columns = jnp.sum(jnp.where(occupied, jnp.uint32(1) << bits, 0), axis=-1, dtype=jnp.uint32)
@@ -43,7 +43,7 @@ def truth_grid(arena: Arena, spec: GridSpec, body: Body) -> tuple[Int[Array, "H 
     return read_cells(columns, ground, body, 0.0, spec)
 
 
-def solid_levels(boxes: Boxes, x, y, spec: GridSpec) -> UInt32[Array, "Y X"]:
+def filled_levels(boxes: Boxes, x: Float[Array, "Y X"], y: Float[Array, "Y X"], spec: GridSpec) -> UInt32[Array, "Y X"]:
     """Mask of the levels that are solid at each place; the base floor, level 0, always is."""
     top_level = spec.levels + spec.lowest - 1
     solid = jnp.ones(x.shape, jnp.uint32)

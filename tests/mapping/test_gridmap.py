@@ -135,14 +135,12 @@ def test_seen_from_a_bump_heights_are_the_worlds():
     assert (classes[cells((1.15, 1.2), (0, 1))] == Cell.OBSTACLE).all()
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e30, -1e30])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, -1e30])
 @pytest.mark.parametrize("leaf", ["x", "y", "z", "weight"])
 def test_bad_points_poison_nothing(leaf, bad):
     good = view(FLOOR)
     spoilt = replace(good, **{leaf: getattr(good, leaf).at[::7].set(bad)})
     kept = replace(good, weight=good.weight.at[::7].set(0))
-    if leaf == "weight" and bad == 1e30:
-        pytest.skip("a large weight is a weight")
     results = [LOOK(empty(SPEC), v, ORIGIN, BODY, PARAMS, spec=SPEC, refit=True) for v in (spoilt, kept)]
     for one, other in zip(*map(jax.tree.leaves, results), strict=True):
         np.testing.assert_array_equal(one, other)
