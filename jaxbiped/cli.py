@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
+import io
+import itertools
 import os
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -57,19 +61,41 @@ def dispatch(name: str, rest: list[str]) -> int:
         raise InputError(f"must be one of {', '.join(COMMANDS)}", field="command", value=name)
     import tyro
 
-    module_name, options_name, summary, takes_file = COMMANDS[name]
+    module_name, options_name, _, takes_file = COMMANDS[name]
     module = importlib.import_module(f"jaxbiped.commands.{module_name}")
     options: type[Model] = getattr(module, options_name)
     default = tyro.MISSING
     if takes_file and rest and not rest[0].startswith("-"):
         path = Path(rest.pop(0))
         default = parse(options, load_toml(path), file=path)
+    extra = {} if default is tyro.MISSING else {"default": default}
+    said = io.StringIO()
     try:
-        extra = {} if default is tyro.MISSING else {"default": default}
-        args = tyro.cli(options, prog=f"jaxbiped {name}", args=rest, description=options.__doc__ or summary, **extra)
+        with contextlib.redirect_stderr(said):
+            args = tyro.cli(options, prog=f"jaxbiped {name}", args=rest, description=options.__doc__, **extra)
     except pydantic.ValidationError as error:
         raise input_error(error) from None
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+        raise one_line(said.getvalue()) from None
     return module.main(args)
+
+
+def one_line(box: str) -> InputError:
+    """The error that tyro draws as a box, as one line of ours: what stands between its title and its first rule."""
+    rows = [line.strip("│ ").strip() for line in box.splitlines()[1:]]
+    message = " ".join(row for row in itertools.takewhile(lambda row: "──" not in row, rows) if row)
+    model = re.match(
+        r"Error parsing (\S+): .*? for \w+ (?:(?!Value error)(\S+) )?(.*?) \[type=\w+, input_value=(.*?), input_type",
+        message,
+    )
+    if model:
+        place, name, what, value = model.groups()
+        place = place.lstrip("-").removeprefix("mission.")
+        field = ".".join(part for part in (place if place[:1].islower() else "", name) if part)
+        return InputError(f"{what.removeprefix('Value error, ')} (got {value})", field=f"--{field}")
+    return InputError(message or "options that cannot be used")
 
 
 def usage() -> str:

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import polars as pl
 import pydantic
+import tyro
 from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 
 from jaxbiped import arenas as arena_room
@@ -46,7 +47,7 @@ class StudyConfig(Model):
     strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
     shard: Annotated[int, pydantic.Field(ge=1, le=65536)] = 1024
     """Arenas that are computed, and written, together."""
-    mission: MissionConfig = MissionConfig()
+    mission: Annotated[MissionConfig, tyro.conf.arg(name="")] = MissionConfig()
 
     @pydantic.model_validator(mode="after")
     def _distinct(self):

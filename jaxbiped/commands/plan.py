@@ -1,0 +1,207 @@
+"""`jaxbiped plan`: a path on a map that somebody already has."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import jax
+import numpy as np
+import tyro
+from jaxtyping import Float, Int
+from pydantic import Field
+
+from jaxbiped.commands.map_source import MapSource, open_map
+from jaxbiped.commands.scenario import check_scenario
+from jaxbiped.config import Model, config_hash
+from jaxbiped.errors import InputError
+from jaxbiped.files import new_folder, refuse_existing, write_whole
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, read_path
+from jaxbiped.report import pictures
+
+Cost = Annotated[float, Field(ge=0.0, le=1e6)]
+Position = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="X Y")]
+Name = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
+NO_PATH = 1  # exit status
+
+
+class PlanArgs(Model):
+    """Plan a path on a map: Moving AI .map, a PNG or PGM with its ROS map_server YAML, or a class grid .npz."""
+
+    file: tyro.conf.Positional[Path]
+    """The map: FILE.map, FILE.yaml (or its picture), or FILE.npz."""
+    start: Position = None
+    """X Y [m] in the map's frame; for a Moving AI map column and row [cells] from the upper left."""
+    goal: Position = None
+    """X Y, as for --start."""
+    scenario: Name = None
+    """A Moving AI scenario (.scen): check each of its optimal lengths, in place of --start and --goal."""
+    sample: Annotated[int | None, Field(ge=1), tyro.conf.arg(metavar="INT")] = None
+    """Check only this many queries of the scenario, evenly spread. Default: all."""
+    c0: Cost = Costs.c0
+    """Cost of distance, for 5 cm. All costs are the paper's, and scaled to the map's cells."""
+    c1: Cost = Costs.c1
+    """Cost of walking on one level, for 5 cm."""
+    c2: Cost = Costs.c2
+    """Cost of a gate, for 5 cm."""
+    c3: Cost = Costs.c3
+    """Cost of one step up or down."""
+    c4: Cost = Costs.c4
+    """Cost of what is unmeasured, for 5 cm."""
+    corner_cutting: bool = False
+    """Allow oblique moves past one blocked cell."""
+    radius: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """[m] Grow obstacles by this much, for a disc of a robot on a map of plain occupancy."""
+    pitch: Annotated[float, Field(gt=0.0, le=1000.0)] = 0.05
+    """[m] Side of a cell of a Moving AI map, whose file does not say."""
+    out: Name = None
+    """Folder to write, which must not exist. Default: results/plan-<hash of these options>."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A path on a map, and what it took."""
+
+    cells_ij: Int[np.ndarray, "n 2"]  # from start to goal
+    costs: Float[np.ndarray, "n"]  # spent on the way to each cell
+    length: float  # [cells] 1 straight, sqrt(2) oblique
+    turns: int  # changes of direction
+    seconds: float  # [s] the field and the path, compiled
+    compile_seconds: float  # [s] the first time, on top
+
+
+def main(args: PlanArgs) -> int:
+    """Run the command: plan and write a folder, or check a scenario.
+
+    Returns:
+      Exit status: 0, or 1 when there is no path or a query's length differs.
+
+    Raises:
+      InputError: options that do not go together, a bad map, start or goal outside the map or in an obstacle, a folder
+        that exists or cannot be written. Nothing is left behind.
+    """
+    identity = args.model_copy(update={"out": None})
+    out = args.out or Path("results") / f"plan-{config_hash(identity)}"
+    refuse_existing(out)
+    check_options(args)
+    source = open_map(args.file, args.pitch, args.radius)
+    if args.scenario is not None:
+        return check_scenario(source, args.scenario, args.sample, out)
+    start_ij = source.free_cell(args.start, "start")
+    goal_ij = source.free_cell(args.goal, "goal")
+    costs = Costs(args.c0, args.c1, args.c2, args.c3, args.c4).at_pitch(source.grid.pitch)
+    plan = find(source, start_ij, goal_ij, costs, Rules(corner_cutting=args.corner_cutting))
+    if plan is None:
+        print(f"no path from {source.say(start_ij)} to {source.say(goal_ij)} on {args.file}")
+        return NO_PATH
+    report(source, plan, args)
+    with new_folder(out) as folder:
+        write(source, plan, folder, args)
+    print(f"written   {out}: path.csv, path.npz, map.png")
+    return 0
+
+
+def check_options(args: PlanArgs) -> None:
+    """Raise `InputError` unless the options go together."""
+    if args.scenario is None:
+        for name in ("start", "goal"):
+            if getattr(args, name) is None:
+                raise InputError("must be given as X Y, unless a --scenario is", field=name)
+        if args.sample is not None:
+            raise InputError("goes with a --scenario only", field="sample", value=args.sample)
+        return
+    for name in ("start", "goal", "c0", "c1", "c2", "c3", "c4", "corner_cutting", "radius"):
+        if getattr(args, name) != PlanArgs.model_fields[name].default:
+            message = "does not go with --scenario, whose lengths are octile and fix costs, corners and positions"
+            raise InputError(message, field=name, value=getattr(args, name))
+
+
+@jax.jit
+def solve(classes, levels, costs, rules, goal_ij):
+    """Edge costs and cost-to-go of one map."""
+    edges = edge_costs(classes[None], levels[None], costs, rules)
+    return edges, field(classes[None], levels[None], costs, rules, goal_ij[None])
+
+
+read = jax.jit(read_path, static_argnames="max_length")
+
+
+def find(
+    source: MapSource, start_ij: tuple[int, int], goal_ij: tuple[int, int], costs: Costs, rules: Rules
+) -> Plan | None:
+    """The best path between two free cells, or None when there is none."""
+    grid = source.grid
+    start, goal = np.array([start_ij], np.int32), np.array(goal_ij, np.int32)
+    (edges, to_go), first, seconds = timed(lambda: solve(grid.classes, grid.levels, costs, rules, goal))
+    if not np.isfinite(to_go.cost[0][start_ij]):
+        return None
+    for most in (4 * sum(grid.shape), grid.classes.size):  # a maze may need as many moves as it has cells
+        path, first_read, seconds_read = timed(lambda most=most: read(to_go, edges, start, max_length=most))
+        if path.valid[0]:
+            break
+    moves = int(path.length[0])
+    cells = np.asarray(path.cells_ij[0, : moves + 1])
+    directions = np.asarray(path.directions[0, :moves])
+    prices = np.asarray(edges[0], np.float64)[directions, *cells[:-1].T]
+    lengths = np.hypot(*DIRECTIONS[directions].T.astype(float))
+    return Plan(
+        cells_ij=cells,
+        costs=np.concatenate([[0.0], np.cumsum(prices)]),
+        length=float(lengths.sum()),
+        turns=int(np.count_nonzero(np.diff(directions))),
+        seconds=seconds + seconds_read,
+        compile_seconds=first + first_read - seconds - seconds_read,
+    )
+
+
+def timed(call):
+    """(result, seconds of the first call, seconds of the second, compiled one)."""
+    seconds = []
+    for _ in range(2):
+        start = time.perf_counter()
+        result = jax.block_until_ready(call())
+        seconds.append(time.perf_counter() - start)
+    return result, *seconds
+
+
+def report(source: MapSource, plan: Plan, args: PlanArgs) -> None:
+    """Print what was found."""
+    grid, moves = source.grid, len(plan.cells_ij) - 1
+    count = {cell.name.lower(): int((grid.classes == cell).sum()) for cell in Cell}
+    cells = ", ".join(f"{number} {name}" for name, number in count.items() if number)
+    rows, columns = grid.shape
+    print(f"map       {args.file}: {source.kind}, {columns} x {rows} cells of {grid.pitch:g} m ({cells})")
+    print(f"from, to  {source.say(tuple(plan.cells_ij[0].tolist()))}, {source.say(tuple(plan.cells_ij[-1].tolist()))}")
+    print(f"cost      {plan.costs[-1]:.6g}")
+    print(f"length    {plan.length * grid.pitch:.3f} m, {plan.length:.3f} cells, {moves} moves, {plan.turns} turns")
+    print(f"time      {plan.seconds * 1e3:.1f} ms, after {plan.compile_seconds:.1f} s to compile")
+
+
+def write(source: MapSource, plan: Plan, folder: Path, args: PlanArgs) -> None:
+    """Fill a folder with the path, as CSV and as npz, and a picture."""
+    grid, cells = source.grid, plan.cells_ij
+    xy = grid.centres_xy(cells)
+    classes, levels = grid.classes[tuple(cells.T)], grid.levels[tuple(cells.T)]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["row", "column", "x_m", "y_m", "class", "level", "cost"])
+    for (i, j), (x, y), cell, level, cost in zip(cells, xy, classes, levels, plan.costs, strict=True):
+        table.writerow([i, j, f"{x:.6g}", f"{y:.6g}", Cell(cell).name.lower(), level, f"{cost:.9g}"])
+    write_whole(folder / "path.csv", lambda file: file.write(text.getvalue().encode()))
+    arrays = {"cells_ij": cells, "xy": xy, "cost": plan.costs, "length_cells": plan.length, "pitch": grid.pitch}
+    write_whole(folder / "path.npz", lambda file: np.savez_compressed(file, **arrays))
+    pictures.save_map(
+        folder / "map.png",
+        grid,
+        title=f"{args.file.name}: cost {plan.costs[-1]:.6g}, {plan.length * grid.pitch:.4g} m",
+        plan_xy=xy,
+        start_xy=tuple(xy[0]),
+        goal_xy=tuple(xy[-1]),
+        goal_radius=None,
+        axis=source.axis,
+    )

@@ -1,0 +1,113 @@
+"""Every query of a Moving AI scenario against the file's optimal length."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float64, Int
+from rich.progress import track
+
+from jaxbiped.commands.map_source import MapSource
+from jaxbiped.errors import InputError
+from jaxbiped.files import new_folder, write_whole
+from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.mapping.moving_ai import load_scenario
+from jaxbiped.planning import Costs, Rules, field
+
+OCTILE = Costs(1.0, 0.0, 0.0, 0.0, 0.0)  # a straight move 1, an oblique one sqrt(2), and nothing else
+CELLS_AT_ONCE = 1 << 21  # of all maps of a chunk; 16 double-width planes of it are 270 MB
+ROUNDING = 1e-6  # of a length, by float32: below 0.005 cells up to 5,000, the least by which octile lengths of
+# one query differ in practice (99 straight moves for 70 oblique ones)
+LISTED = 10  # queries that differ, printed one by one
+DIFFER = 1  # exit status
+
+
+@jax.jit
+def costs_to(classes, levels, goals_ij):
+    """Octile length from every cell to each goal, corners never cut."""
+    batch = len(goals_ij)
+    maps = (jnp.broadcast_to(array, (batch, *array.shape)) for array in (classes, levels))
+    return field(*maps, OCTILE, Rules(corner_cutting=False), goals_ij).cost
+
+
+def lengths(
+    grid: ClassGrid, start_ij: Int[np.ndarray, "Q 2"], goal_ij: Int[np.ndarray, "Q 2"], show: bool = False
+) -> Float64[np.ndarray, "Q"]:
+    """Octile length [cells] of each query, inf where there is no path: one field a distinct goal, in chunks.
+
+    Args:
+      grid: the map.
+      start_ij, goal_ij: cells.
+      show: draw a progress bar.
+
+    Right to `ROUNDING` of a length.
+    """
+    found = np.full(len(goal_ij), np.inf)
+    goals, of_query = np.unique(goal_ij, axis=0, return_inverse=True)
+    of_query = of_query.reshape(-1)
+    size = int(np.clip(CELLS_AT_ONCE // grid.classes.size, 1, min(64, len(goals))))
+    firsts = range(0, len(goals), size)
+    for first in track(firsts, description="queries", transient=True, disable=not show):
+        chunk = goals[np.minimum(np.arange(first, first + size), len(goals) - 1)]  # the last one filled up: one shape
+        cost = np.asarray(costs_to(grid.classes, grid.levels, chunk.astype(np.int32)))
+        mine = np.flatnonzero((of_query >= first) & (of_query < first + size))
+        i, j = start_ij[mine].T
+        found[mine] = cost[of_query[mine] - first, i, j]
+    return found
+
+
+def check_scenario(source: MapSource, path: Path, sample: int | None, out: Path) -> int:
+    """Compare each query with the planner, print how many agree, and write all of them to `out`/queries.csv.
+
+    Args:
+      source: the map.
+      path: the scenario.
+      sample: check only this many queries, evenly spread.
+      out: a folder that does not exist.
+
+    Returns:
+      Exit status: 0 when all agree, 1 when any differs.
+
+    Raises:
+      InputError: the map is no Moving AI map, a bad scenario, or `out` cannot be written.
+    """
+    if not source.in_cells:
+        raise InputError("goes with a Moving AI .map only", file=source.file, field="scenario", value=str(path))
+    scenario = load_scenario(path, source.grid)
+    count = len(scenario.optimal)
+    picked = np.unique(np.linspace(0, count - 1, min(sample or count, count)).round().astype(int))
+    start, goal, optimal = scenario.start_ij[picked], scenario.goal_ij[picked], scenario.optimal[picked]
+    began = time.perf_counter()
+    found = lengths(source.grid, start, goal, show=True)
+    seconds = time.perf_counter() - began
+    slack = scenario.tolerance[picked] + ROUNDING * optimal
+    equal = np.abs(found - optimal) <= slack
+    rows = [
+        [int(b), int(s[1]), int(s[0]), int(g[1]), int(g[0]), float(o), f"{f:.9g}", bool(e)]
+        for b, s, g, o, f, e in zip(scenario.bucket[picked], start, goal, optimal, found, equal, strict=True)
+    ]
+    print(f"map       {source.file}: {source.grid.shape[1]} x {source.grid.shape[0]} cells")
+    print(f"scenario  {path}: {len(picked)} of {count} queries, in {seconds:.1f} s with compilation")
+    print(f"equal     {int(equal.sum())} of {len(picked)} optimal lengths")
+    wrong = [row for row in rows if not row[-1]]
+    for bucket, sx, sy, gx, gy, best, got, _ in wrong[:LISTED]:
+        off_ground = Cell.OBSTACLE in source.grid.classes[[sy, gy], [sx, gx]]
+        why = ", for an end is water, trees or out of bounds" if off_ground else ""
+        print(f"differs   bucket {bucket}, ({sx}, {sy}) to ({gx}, {gy}): file {best:.9g}, found {got}{why}")
+    if len(wrong) > LISTED:
+        print(f"          and {len(wrong) - LISTED} more")
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["bucket", "start_x", "start_y", "goal_x", "goal_y", "optimal", "found", "equal"])
+    table.writerows(rows)
+    with new_folder(out) as folder:
+        write_whole(folder / "queries.csv", lambda file: file.write(text.getvalue().encode()))
+    print(f"written   {out}: queries.csv")
+    return DIFFER if wrong else 0
