@@ -20,14 +20,16 @@ from jaxbiped.commands.scenario import check_scenario
 from jaxbiped.config import Model, config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
+from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, read_path
+from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, next_step
 from jaxbiped.report import pictures
 
 Cost = Annotated[float, Field(ge=0.0, le=1e6)]
 Position = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="X Y")]
 Name = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
 NO_PATH = 1  # exit status
+MOVES_AT_ONCE = 256  # read off a field by one compiled call
 
 
 class PlanArgs(Model):
@@ -43,7 +45,7 @@ class PlanArgs(Model):
     """A Moving AI scenario (.scen): check each of its optimal lengths, in place of --start and --goal."""
     sample: Annotated[int | None, Field(ge=1), tyro.conf.arg(metavar="INT")] = None
     """Check only this many queries of the scenario, evenly spread. Default: all."""
-    c0: Cost = Costs.c0
+    c0: Annotated[float, Field(ge=1e-3, le=1e6)] = Costs.c0
     """Cost of distance, for 5 cm. All costs are the paper's, and scaled to the map's cells."""
     c1: Cost = Costs.c1
     """Cost of walking on one level, for 5 cm."""
@@ -125,29 +127,31 @@ def check_options(args: PlanArgs) -> None:
 def solve(classes, levels, costs, rules, goal_ij):
     """Edge costs and cost-to-go of one map."""
     edges = edge_costs(classes[None], levels[None], costs, rules)
-    return edges, field(classes[None], levels[None], costs, rules, goal_ij[None])
+    return edges[0], field(classes[None], levels[None], costs, rules, goal_ij).cost
 
 
-read = jax.jit(read_path, static_argnames="max_length")
+steps = jax.jit(next_step, static_argnames="length")
 
 
 def find(
     source: MapSource, start_ij: tuple[int, int], goal_ij: tuple[int, int], costs: Costs, rules: Rules
 ) -> Plan | None:
-    """The best path between two free cells, or None when there is none."""
+    """The best path between two free cells, or None when there is none.
+
+    Raises:
+      InputError: costs so far apart that float32 cannot tell the cells of the way from each other.
+    """
     grid = source.grid
-    start, goal = np.array([start_ij], np.int32), np.array(goal_ij, np.int32)
+    start, goal = np.array([start_ij], np.int32), np.array([goal_ij], np.int32)
     (edges, to_go), first, seconds = timed(lambda: solve(grid.classes, grid.levels, costs, rules, goal))
-    if not np.isfinite(to_go.cost[0][start_ij]):
+    if not np.isfinite(to_go[0][start_ij]):
         return None
-    for most in (4 * sum(grid.shape), grid.classes.size):  # a maze may need as many moves as it has cells
-        path, first_read, seconds_read = timed(lambda most=most: read(to_go, edges, start, max_length=most))
-        if path.valid[0]:
-            break
-    moves = int(path.length[0])
-    cells = np.asarray(path.cells_ij[0, : moves + 1])
-    directions = np.asarray(path.directions[0, :moves])
-    prices = np.asarray(edges[0], np.float64)[directions, *cells[:-1].T]
+    directions, first_read, seconds_read = timed(lambda: read(grid, to_go, costs, rules, start))
+    cells = np.concatenate([start, start + np.cumsum(DIRECTIONS[directions], axis=0)])
+    if tuple(cells[-1].tolist()) != goal_ij:
+        message = "must not exceed the other costs so much: single precision loses the way on this map"
+        raise InputError(message, field="c4", value=float(costs.c4))
+    prices = np.asarray(edges, np.float64)[directions, *cells[:-1].T]
     lengths = np.hypot(*DIRECTIONS[directions].T.astype(float))
     return Plan(
         cells_ij=cells,
@@ -157,6 +161,20 @@ def find(
         seconds=seconds + seconds_read,
         compile_seconds=first + first_read - seconds - seconds_read,
     )
+
+
+def read(grid: ClassGrid, to_go, costs: Costs, rules: Rules, start_ij: Int[np.ndarray, "1 2"]) -> Int[np.ndarray, "n"]:
+    """Directions of all moves of the path, a slice at a time, so that its length needs not be known."""
+    moves, ij, heading = np.zeros(0, np.int64), start_ij, np.array([-1], np.int32)
+    while True:
+        more = np.asarray(
+            steps(to_go, grid.classes[None], grid.levels[None], costs, rules, ij, heading, length=MOVES_AT_ONCE)
+        )[0]
+        more = more[more >= 0].astype(np.int64)
+        moves = np.concatenate([moves, more])
+        if len(more) < MOVES_AT_ONCE:
+            return moves
+        ij, heading = start_ij + DIRECTIONS[moves].sum(0).astype(np.int32), more[-1:].astype(np.int32)
 
 
 def timed(call):
