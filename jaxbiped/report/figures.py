@@ -191,7 +191,7 @@ def difficulty(frame: pl.DataFrame, comparison: Comparison) -> Figure:
     arenas = frame.unique("arena")["difficulty"].to_numpy()
     edges = np.unique(np.quantile(arenas, np.linspace(0, 1, BINS + 1)[1:-1], method="lower"))
     figure, ax = canvas(6.4, 4.2)
-    width = 0.25 * np.ptp(arenas) / BINS
+    width = 0.25 * float(np.ptp(arenas)) / BINS
     for offset, strategy in zip(dodge(len(comparison.strategies), width), comparison.strategies, strict=True):
         rows = frame.filter(pl.col("strategy") == strategy)
         values, reached = rows["difficulty"].to_numpy(), rows["success"].to_numpy()
