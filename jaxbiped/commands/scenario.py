@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float64, Int
+from rich.console import Console
 from rich.progress import track
 
 from jaxbiped.commands.map_source import MapSource
@@ -54,7 +55,7 @@ def lengths(
     of_query = of_query.reshape(-1)
     size = int(np.clip(CELLS_AT_ONCE // grid.classes.size, 1, min(64, len(goals))))
     firsts = range(0, len(goals), size)
-    for first in track(firsts, description="queries", transient=True, disable=not show):
+    for first in track(firsts, description="queries", transient=True, disable=not show, console=Console(stderr=True)):
         chunk = goals[np.minimum(np.arange(first, first + size), len(goals) - 1)]  # the last one filled up: one shape
         cost = np.asarray(costs_to(grid.classes, grid.levels, chunk.astype(np.int32)))
         mine = np.flatnonzero((of_query >= first) & (of_query < first + size))

@@ -5,8 +5,8 @@ Format: Sturtevant, "Benchmarks for Grid-Based Pathfinding", IEEE T-CIAIG 4(2), 
 nothing is flipped, so that cell (i, j) = (y, x); the grid's y axis therefore points down the page, and pictures
 of such a map turn it over.
 
-Deviation: water (`W`) is passable in the format, but only from water. A robot that walks has no business there:
-it is an obstacle. Every other character is read as the format says.
+Deviation: water (`W`) is passable in the format, but only from water, and public scenarios hold queries within water
+and even within trees. A robot that walks has no business there: both are obstacles, and such a query has no path.
 """
 
 from __future__ import annotations
