@@ -1,7 +1,22 @@
 """Grid to graph costs, cost-to-go field and path; the reference A*."""
 
+from jaxbiped.planning.astar import AStarPath, astar
 from jaxbiped.planning.costs import BASE_PITCH, DIRECTIONS, Costs, Rules, edge_costs
 from jaxbiped.planning.field import CostToGo, cost_to_go, field
-from jaxbiped.planning.path import next_step
+from jaxbiped.planning.path import Path, next_step, read_path
 
-__all__ = ["BASE_PITCH", "DIRECTIONS", "CostToGo", "Costs", "Rules", "cost_to_go", "edge_costs", "field", "next_step"]
+__all__ = [
+    "BASE_PITCH",
+    "DIRECTIONS",
+    "AStarPath",
+    "CostToGo",
+    "Costs",
+    "Path",
+    "Rules",
+    "astar",
+    "cost_to_go",
+    "edge_costs",
+    "field",
+    "next_step",
+    "read_path",
+]

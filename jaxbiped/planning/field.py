@@ -44,6 +44,7 @@ def cost_to_go(
 
     def chunk(edges, goal):
         valid = (edges >= 0).all((1, 2, 3))
+        edges = jnp.where(valid[:, None, None, None], edges, jnp.inf)
         last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
         return _solve(tuple(last), goal, method, valid)
 
@@ -71,6 +72,7 @@ def field(
         costs, rules = each
         last = (jnp.moveaxis(a, 0, -1) for a in (classes, levels))
         valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)  # False for NaN as well
+        costs = jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs)
         return _solve(half_edges(*last, costs, rules), goal, method, valid)
 
     return _by_chunks(chunk, (jnp.asarray(classes), jnp.asarray(levels), each, jnp.asarray(goal_ij)))
@@ -80,7 +82,6 @@ def _solve(edges, goal_ij, method, valid) -> CostToGo:
     if method not in ("auto", *kernels.METHODS):
         raise InputError(f"must be one of auto, {', '.join(kernels.METHODS)}", field="method", value=method)
     method = kernels.default_method() if method == "auto" else method
-    edges = tuple(jnp.where(valid, e, jnp.inf) for e in edges)
     # Sums along a path drift by up to half a unit in the last place a move: with float32 a path through a
     # large maze is off by more than 1e-5, so the kernels alone are then float64, in any program.
     large = edges[0].shape[0] * edges[0].shape[1] > SINGLE_CELLS

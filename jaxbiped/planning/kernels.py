@@ -51,17 +51,19 @@ def put(array, part, at):
     return lax.dynamic_update_slice(array, part, at, allow_negative_indices=False)
 
 
-def line_sweep(edges, cost, step):
-    """Pass number `step` (down, up, down, ...): (cost, changed [B]).
+def line_sweep(edges, state, step):
+    """Pass number `step` (down, up, down, ...) on (cost, rows [H + 2]); gives the same and changed [B].
 
     Each row relaxes from the row before and along itself, rightwards and then leftwards, so that a path which
     never turns back settles in one pass. After a pass all moves but those towards the other side are settled:
-    a pass that changes nothing, after one the other way, ends the search.
+    a pass that changes nothing, after one the other way, ends the search. `rows` are those that the last pass
+    changed: a row is skipped unless the row before is one of them or has just changed.
     """
+    cost, rows = state
     height, width, batch = cost.shape[0] - 2, cost.shape[1] - 2, cost.shape[2]
-    up = step % 2 == 1
+    up, first = step % 2 == 1, step == 0
     side = jnp.where(up, 1, -1)  # where the row before lies
-    blank = jnp.full((width + 2, batch), jnp.inf, cost.dtype)
+    none = jnp.full((1, batch), jnp.inf, cost.dtype)
 
     def one(array, i, j):
         return take(array, (i, j, 0), (1, 1, batch))[0]
@@ -75,34 +77,43 @@ def line_sweep(edges, cost, step):
         return jnp.where(up, one(edges[k], i, j), one(edges[k + 4], i, j))
 
     def row(n, state):
-        cost, before, changed = state
+        cost, rows_now, before, changed, fresh = state
         i = jnp.where(up, height - n, n + 1)
+        active = first | (take(rows, (i + side,), (1,))[0] > 0) | (fresh > 0)
+        cells = jnp.where(active, width, 0)
 
         def rightwards(n, state):
             line, last = state
             j = n + 1
-            new = least(one(cost, i, j), last + west(i, j))
+            new = least(take(line, (j, 0), (1, batch)), last + west(i, j))
             for k in (1, 2, 3):
                 new = least(new, take(before, (j + side * DJ[k], 0), (1, batch)) + across(k, i, j))
             return put(line, new, (j, 0)), new
 
         def leftwards(n, state):
-            line, last, changed = state
+            line, last, now = state
             j = width - n
             new = least(take(line, (j, 0), (1, batch)), last + one(edges[0], i, j))
-            changed = jnp.where(new < one(cost, i, j), 1, changed)
-            return put(line, new, (j, 0)), new, changed
+            now = jnp.where(new < one(cost, i, j), 1.0, now)
+            return put(line, new, (j, 0)), new, now
 
-        line, _ = lax.fori_loop(0, width, rightwards, (blank, blank[:1]))
-        line, _, changed = lax.fori_loop(0, width, leftwards, (line, blank[:1], changed))
-        return put(cost, line[None], (i, 0, 0)), line, changed
+        line = take(cost, (i, 0, 0), (1, width + 2, batch))[0]
+        line, _ = lax.fori_loop(0, cells, rightwards, (line, none))
+        line, _, now = lax.fori_loop(0, cells, leftwards, (line, none, jnp.zeros((1, batch), jnp.float32)))
+        fresh = jnp.max(now)
+        seed = jnp.where(first, take(rows, (i,), (1,))[0], 0.0)
+        rows_now = put(rows_now, jnp.maximum(fresh, seed)[None], (i,))
+        return put(cost, line[None], (i, 0, 0)), rows_now, line, jnp.maximum(changed, now), fresh
 
-    cost, _, changed = lax.fori_loop(0, height, row, (cost, blank, jnp.zeros((1, batch), jnp.int32)))
-    return cost, changed[0] > 0
+    blank = jnp.full((width + 2, batch), jnp.inf, cost.dtype)
+    state = cost, jnp.zeros_like(rows), blank, jnp.zeros((1, batch), jnp.float32), jnp.float32(0)
+    cost, rows, _, changed, _ = lax.fori_loop(0, height, row, state)
+    return (cost, rows), changed[0] > 0
 
 
-def wavefront(edges, cost, step):
-    """Relax every cell from its eight neighbours at once: (cost, changed [B])."""
+def wavefront(edges, state, step):
+    """Relax every cell from its eight neighbours at once, whatever the `step`; state and result as above."""
+    cost, rows = state
     height, width = cost.shape[0] - 2, cost.shape[1] - 2
 
     def at(array, di, dj):
@@ -112,7 +123,7 @@ def wavefront(edges, cost, step):
     for k in range(8):
         edge = at(edges[k], 0, 0) if k < len(edges) else at(edges[k - 4], DI[k], DJ[k])
         new = least(new, at(cost, DI[k], DJ[k]) + edge)
-    return cost.at[1:-1, 1:-1].set(new), jnp.any(new < inner, axis=(0, 1))
+    return (cost.at[1:-1, 1:-1].set(new), rows), jnp.any(new < inner, axis=(0, 1))
 
 
 METHODS = {"line_sweep": line_sweep, "wavefront": wavefront}
@@ -134,7 +145,8 @@ def settle(method, edges, goal_ij):
     rows, columns = (lax.broadcasted_iota(jnp.int32, (height, width, 1), a) for a in (0, 1))
     inside = (goal_ij >= 0).all(-1) & (goal_ij[:, 0] < height - 2) & (goal_ij[:, 1] < width - 2)
     start = inside & (rows == goal_ij[:, 0] + 1) & (columns == goal_ij[:, 1] + 1)
-    start = jnp.where(start, 0.0, jnp.inf).astype(edges[0].dtype)
+    goal_rows = start.any((1, 2)).astype(jnp.float32)
+    start = jnp.where(start, 0.0, jnp.inf).astype(edges[0].dtype), goal_rows
 
     def again(state):
         _, changed, _, step = state
@@ -146,5 +158,5 @@ def settle(method, edges, goal_ij):
         return cost, changed, jnp.where(changed, step + 1, steps), step + 1
 
     state = start, jnp.ones((batch,), bool), jnp.zeros((batch,), jnp.int32), jnp.int32(0)
-    cost, changed, steps, _ = lax.while_loop(again, body, state)
+    (cost, _), changed, steps, _ = lax.while_loop(again, body, state)
     return cost[1:-1, 1:-1], steps, ~changed

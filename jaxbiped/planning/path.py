@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float, Int, Int8
 
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, cell_kinds, kind_cost, move_kind
+from jaxbiped.planning.field import CostToGo
 
 TIE = 1e-6  # relative: ways whose costs differ by less are equally good; ten roundings of a float32
 
@@ -40,6 +41,65 @@ def pick(ahead: Float[Array, "B 8"], downhill: Bool[Array, "B 8"], heading: Int[
     keeps = jnp.take_along_axis(good, jnp.maximum(heading, 0)[:, None], -1)[:, 0] & (heading >= 0)
     choice = jnp.where(keeps, heading, jnp.argmax(good, -1))
     return jnp.where(good.any(-1), choice, -1).astype(jnp.int8)
+
+
+def read_path(
+    field: CostToGo,
+    edge_costs: Float[Array | np.ndarray, "B 8 H W"],
+    start_ij: Int[Array | np.ndarray, "B 2"],
+    max_length: int,
+    heading: Int[Array | np.ndarray, "B"] | None = None,
+) -> Path:
+    """The least path from each start, read off a field; ties as in `pick`.
+
+    It ends at the goal; where moves cost nothing it may end at a cell from which the goal is reached for
+    nothing. Across dearer plateaus of moves that cost nothing (or less than a float32 of the cost to go can
+    show) it takes the fewest moves.
+
+    Args:
+      start_ij: outside the grid there is no path.
+      max_length: static; number of moves that there is room for.
+      heading: direction of the move before the first, -1 for none (the default).
+    """
+    cost, edges = field.cost, jnp.asarray(edge_costs)
+    near = jnp.stack([_shifted(cost, di, dj) for di, dj in DIRECTIONS], 1)
+    ahead, own = edges + near, cost[:, None]
+    good = (ahead <= ahead.min(1, keepdims=True) * (1 + TIE)) & jnp.isfinite(ahead)
+    flat = good & (near == own)
+    rank = jnp.where((good & (near < own)).any(1), 0.0, jnp.inf)
+
+    def closer(rank):  # moves on a plateau to its nearest way down
+        near_rank = jnp.stack([_shifted(rank, di, dj) for di, dj in DIRECTIONS], 1)
+        return jnp.minimum(rank, jnp.where(flat, near_rank + 1, jnp.inf).min(1)), near_rank
+
+    rank = lax.while_loop(lambda s: s[1], lambda s: (new := closer(s[0])[0], jnp.any(new < s[0])), (rank, True))[0]
+    downhill = (near < own) | (flat & (closer(rank)[1] < rank[:, None]))
+    arena, (height, width) = jnp.arange(cost.shape[0]), cost.shape[1:]
+    start, heading = jnp.asarray(start_ij, jnp.int32), jnp.full(len(arena), -1) if heading is None else heading
+    inside = ((start >= 0) & (start < jnp.array([height, width]))).all(-1)
+
+    def step(state, _):
+        ij, heading = state
+        at = (arena, slice(None), ij[:, 0], ij[:, 1])
+        there = inside & (cost[arena, ij[:, 0], ij[:, 1]] > 0)
+        direction = pick(ahead[at], downhill[at] & there[:, None], heading)
+        moves = direction >= 0
+        ij = jnp.where(moves[:, None], ij + jnp.asarray(DIRECTIONS, jnp.int32)[direction], ij)
+        return (ij, jnp.where(moves, direction, heading)), (jnp.where(moves[:, None], ij, -1), direction)
+
+    first = jnp.where(inside[:, None], start, 0), jnp.asarray(heading, jnp.int32)
+    (last, _), (cells, directions) = lax.scan(step, first, None, length=max_length)
+    total = jnp.where(inside, cost[arena, first[0][:, 0], first[0][:, 1]], jnp.inf)
+    valid = inside & jnp.isfinite(total) & (cost[arena, last[:, 0], last[:, 1]] == 0)
+    cells = jnp.moveaxis(jnp.concatenate([start[None], cells]), 0, 1)
+    return Path(cells, directions.T, (directions >= 0).sum(0), total, valid)
+
+
+def _shifted(array, di, dj):
+    """`array[b, i + di, j + dj]`, inf outside."""
+    _, height, width = array.shape
+    padded = jnp.pad(array, ((0, 0), (1, 1), (1, 1)), constant_values=jnp.inf)
+    return padded[:, 1 + di : 1 + di + height, 1 + dj : 1 + dj + width]
 
 
 def next_step(

@@ -27,7 +27,7 @@ def edge_costs(classes, levels, costs=(1, 1, 5, 10, 100), corner_cutting=False, 
                 if not (0 <= a < height and 0 <= b < width) or blocked(i, j) or blocked(a, b):
                     continue
                 rise = abs(int(levels[i, j]) - int(levels[a, b]))
-                sides = blocked(a, j) + blocked(i, b) if di and dj else 0
+                sides = int(blocked(a, j)) + int(blocked(i, b)) if di and dj else 0
                 if rise > 1 or sides == 2 or (sides == 1 and not corner_cutting):
                     continue
                 ends = {classes[i, j], classes[a, b]}
