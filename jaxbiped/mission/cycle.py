@@ -22,6 +22,8 @@ from jaxbiped.sensing.localisation import predict
 from jaxbiped.sensing.view import Sightings, View
 
 SENSE = 1  # channel of a mission's seed
+ORACLE_SPACING = 0.05  # [m] one column of the oracle's points for each cell of the paper's grid
+ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid by itself
 
 
 def cycle(
@@ -34,7 +36,7 @@ def cycle(
     view, sightings = jax.vmap(sense, in_axes=(0, 0, 0, 0, None))(world, mind, arena, settings, program)
     if program.sensor == "oracle":
         mind = replace(mind, belief=replace(mind.belief, pose=on_level(world.pose, program)))
-    thinking, command, verdict, thought = decide(mind, view, sightings, arena, settings, program.spec)
+    thinking, command, verdict, thought = decide(mind, view, sightings, arena, settings, program)
     executed = jax.vmap(EXECUTORS[program.executor])(arena, world, command, settings)
     after, moved = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, thinking, command, verdict, executed, arena, settings, program
@@ -48,7 +50,8 @@ def sense(world: World, mind: Mind, arena: Arena, settings: Settings, program: P
     """What one robot measures from where it really stands."""
     seed = fold(world.seed, SENSE, world.decisions)
     if program.sensor == "oracle":
-        view = oracle.measure(arena, world.pose, (program.spec.size_x, program.spec.size_y))
+        area = (program.spec.size_x, program.spec.size_y)
+        view = oracle.measure(arena, world.pose, area, spacing=ORACLE_SPACING, weight=ORACLE_WEIGHT)
     else:
         view = raycast.measure(
             arena, world.pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat

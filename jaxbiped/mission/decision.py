@@ -16,7 +16,7 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import Settings
+from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
@@ -41,7 +41,7 @@ class Thought:
 
 
 def decide(
-    mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, spec: GridSpec
+    mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program
 ) -> tuple[Mind, Command, Int[Array, "B"], Thought]:
     """What each robot does next. All arguments have a leading batch axis.
 
@@ -52,8 +52,9 @@ def decide(
       will (else RUNNING), and the thought.
     """
     mind, classes, levels, ij, goal_ij = jax.vmap(perceive, in_axes=(0, 0, 0, 0, 0, None))(
-        mind, view, sightings, arena, settings, spec
+        mind, view, sightings, arena, settings, program
     )
+    spec = program.spec
     blind = settings.strategy.blind
     plan_classes = jnp.where(blind[:, None, None], jnp.int8(Cell.FLOOR), classes)
     plan_levels = jnp.where(blind[:, None, None], jnp.int8(0), levels)
@@ -69,8 +70,9 @@ def decide(
     return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij, mind.belief.pose)
 
 
-def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, spec: GridSpec):
+def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program):
     """One robot after a measurement: its mind, the classed map, its cell and the goal's."""
+    spec = program.spec
     belief = correct(mind.belief, arena.landmarks, sightings)
     pose = belief.pose
     level = jnp.round(pose.z / spec.level_height).astype(jnp.int8)
@@ -79,7 +81,8 @@ def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, setting
     grid_map = mind.grid_map
     marked = mapping.mark_footprint(grid_map, pose.x, pose.y, level, radius, spec)
     grid_map = jax.tree.map(lambda new, old: jnp.where(untouched, new, old), marked, grid_map)
-    grid_map = mapping.update(grid_map, view, pose, settings.body, settings.mapping, spec)
+    tilted = program.sensor != "oracle"  # whose points have no attitude error to take out
+    grid_map = mapping.update(grid_map, view, pose, settings.body, settings.mapping, spec, refit=tilted)
     classes, levels = mapping.classify(grid_map, settings.mapping, spec)
     ij = cell_of(pose.x, pose.y, spec)
     goal_ij = cell_of(arena.goal_xy[0], arena.goal_xy[1], spec)

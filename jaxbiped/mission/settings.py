@@ -20,6 +20,10 @@ from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
 from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
 from jaxbiped.sensing.noise import NoiseConfig, StereoNoise
 from jaxbiped.sensing.odometry import OdometryConfig, OdometryNoise
+from jaxbiped.sensing.presets import PRESETS
+
+# [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
+MAX_RADIUS = 0.15
 
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e6)]
 
@@ -58,6 +62,8 @@ class MissionConfig(Model):
     """One kind of mission. Every default is the paper's value, or named where it is chosen."""
 
     sensor: Literal["raycast", "oracle"] = "raycast"
+    preset: Literal["ideal", "rendered", "real"] = "rendered"
+    """How well the camera measures: fills in `stereo` and `landmarks`, where these are not given."""
     executor: Literal["kinematic"] = "kinematic"
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
@@ -73,9 +79,20 @@ class MissionConfig(Model):
     mapping: MapConfig = MapConfig()
     limits: LimitConfig = LimitConfig()
 
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, data):
+        """What is at its default comes from the preset: a command line fills in all defaults."""
+        preset = PRESETS.get(data.get("preset", "rendered")) if isinstance(data, dict) else None
+        if preset is None:
+            return data
+        defaults = {"stereo": NoiseConfig(), "landmarks": LandmarkConfig()}
+        same = {name: data.get(name, default) in (default, default.model_dump()) for name, default in defaults.items()}
+        return data | {name: getattr(preset, name) for name, is_default in same.items() if is_default}
+
     def grid(self, size_xy: tuple[float, float]) -> GridSpec:
         """The static grid of an area [m]; InputError when the pitch does not divide it."""
-        return GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch)
+        return GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch, max_radius=MAX_RADIUS)
 
     def settings(self, strategy_name: str) -> Settings:
         """The traced part, for one strategy."""

@@ -16,9 +16,9 @@ Length = Annotated[float, pydantic.Field(gt=0.0, le=2.0)]
 class RobotConfig(Model):
     """A biped as an upright cylinder that can squat (paper, 2.2, Fig. 4); by default the e-nuvo WALK of the paper."""
 
-    radius: Annotated[float, pydantic.Field(gt=0.0, le=0.2)] = 0.10
+    radius: Annotated[float, pydantic.Field(gt=0.0, le=0.15)] = 0.10
     """[m] of the cylinder that obstacles are grown by: the body, and a margin for pose errors."""
-    body_radius: Annotated[float, pydantic.Field(gt=0.0, le=0.2)] = 0.08
+    body_radius: Annotated[float, pydantic.Field(gt=0.0, le=0.15)] = 0.08
     """[m] of the cylinder that really collides."""
     standing: Length = 0.385
     """[m] head height, standing."""

@@ -31,7 +31,7 @@ def measure(
     Args:
       level_height: [m] between the points inside boxes; level l is about l times that.
       levels: 0 to levels - 1; boxes above (higher than any head) have no points there.
-      weight: [px] of each point.
+      weight: [px] of each point; the one on the ground, which supports, has twice that.
 
     Returns:
       `columns * (1 + levels)` points; weight 0 where a level is empty, and everywhere when the pose is not finite.
@@ -50,7 +50,8 @@ def measure(
     forward, left = to_robot(pose, x, y)
     there = there & jnp.isfinite(forward + left + z)
     points = (jnp.where(there, axis, 0.0).reshape(-1) for axis in (forward[None], left[None], z))
-    return View(*points, weight=jnp.where(there, weight, 0.0).reshape(-1))
+    heavy = jnp.where(np.arange(levels + 1)[:, None] == 0, 2.0, 1.0)
+    return View(*points, weight=jnp.where(there, weight * heavy, 0.0).reshape(-1))
 
 
 def heights(

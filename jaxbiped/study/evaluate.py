@@ -180,7 +180,9 @@ def frame(
             "goal_distance": result.goal_distance[p].astype(float),
             "reachable": reachable,
             "oracle_cost": masked(plan.cost[p, :count].astype(float), reachable),
-            "oracle_length": masked(plan.length[p, :count].astype(float), reachable),
+            "oracle_length": masked(
+                plan.length[p, :count].astype(float), reachable & np.isfinite(plan.length[p, :count])
+            ),
         }
         frames.append(pl.DataFrame(columns, schema=SCHEMA))
     return pl.concat(frames)

@@ -256,12 +256,12 @@ def measure_oracle(arena, pose, size_xy, spacing=0.025, level_height=0.03, level
                         below, above = min(below, boxes.bottom[m]), max(above, boxes.top[m])
                     else:
                         ground = max(ground, boxes.top[m])
-            points.append((x, y, ground))
+            points.append((x, y, ground, 2 * weight))
             for z in np.arange(levels) * level_height:
                 if z < ground - 1e-9:
-                    points.append((x, y, z))
+                    points.append((x, y, z, weight))
                 elif z + level_height / 2 > below and z - level_height / 2 <= above:
-                    points.append((x, y, min(max(z, below), above)))
-    x, y, z = np.array(points).T - np.array([[pose.x], [pose.y], [pose.z]])
+                    points.append((x, y, min(max(z, below), above), weight))
+    x, y, z, weights = np.array(points).T - np.array([[pose.x], [pose.y], [pose.z], [0.0]])
     c, s = np.cos(pose.yaw), np.sin(pose.yaw)
-    return View(*(axis.astype(f32) for axis in (c * x + s * y, c * y - s * x, z)), weight=np.full(len(x), f32(weight)))
+    return View(*(axis.astype(f32) for axis in (c * x + s * y, c * y - s * x, z)), weight=weights.astype(f32))

@@ -24,6 +24,7 @@ def test_agrees_with_plain_loop():
         found = np.stack([axis[k][there] for axis in (views.x, views.y, views.z)], axis=1)
         wanted = np.stack([expected.x, expected.y, expected.z], axis=1)
         assert len(found) == len(wanted)
+        assert np.allclose(np.sort(views.weight[k][there]), np.sort(expected.weight))
         order = lambda points: points[np.lexsort(np.round(points, 4).T)]  # noqa: E731
         assert np.allclose(np.sort(found, axis=0), np.sort(wanted, axis=0), atol=1e-5)
         assert np.median(np.abs(order(found) - order(wanted))) < 1e-5
