@@ -83,9 +83,13 @@ def dispatch(name: str, rest: list[str]) -> int:
 
 
 def one_line(box: str) -> InputError:
-    """The error that tyro draws as a box, as one line of ours: what stands between its title and its first rule."""
-    rows = [line.strip("│ ").strip() for line in box.splitlines()[1:]]
-    message = " ".join(row for row in itertools.takewhile(lambda row: "──" not in row, rows) if row)
+    """The error that tyro draws as a box, as one line of ours: what stands between its title and its first rule.
+
+    Rules are drawn with lines or, where the terminal has none, with dashes, one of them under the title.
+    """
+    rows = [row for line in box.splitlines() if (row := line.strip("│| "))]
+    rows = itertools.dropwhile(is_rule, rows[1:])
+    message = " ".join(itertools.takewhile(lambda row: not is_rule(row), rows))
     model = re.match(
         r"Error parsing (\S+): .*? for \w+ (?:(?!Value error)(\S+) )?(.*?) \[type=\w+, input_value=(.*?), input_type",
         message,
@@ -96,6 +100,11 @@ def one_line(box: str) -> InputError:
         field = ".".join(part for part in (place if place[:1].islower() else "", name) if part)
         return InputError(f"{what.removeprefix('Value error, ')} (got {value})", field=f"--{field}")
     return InputError(message or "options that cannot be used")
+
+
+def is_rule(row: str) -> bool:
+    """A rule in a box, or its border."""
+    return row.startswith("╰") or set(row) <= set("─-")
 
 
 def usage() -> str:

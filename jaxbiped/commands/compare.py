@@ -11,8 +11,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing
+from jaxbiped.mission.settings import program
 from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import terminal
 from jaxbiped.study import store
@@ -40,6 +42,7 @@ def main(args: CompareArgs) -> int:
       InputError: a config that cannot be run, a folder that exists or cannot be written, a full disk.
     """
     config = StudyConfig.model_validate(args.model_dump(exclude={"out"}))
+    program(config.mission, (SIZE_X, SIZE_Y))  # refuses what does not fit before anything is written
     out = args.out or Path("results") / f"compare-{config_hash(config)}"
     refuse_existing(out)
     console = Console()

@@ -1,0 +1,142 @@
+"""Wrong input ends with one line and status 2, before anything is compiled or written."""
+
+import errno
+import json
+
+import polars as pl
+import pytest
+
+from jaxbiped import cli, files
+from jaxbiped.study.schema import SCHEMA
+
+SCENE = "configs/scenes/experiment_5.toml"
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch, request):
+    """An empty working folder, with the repository's configs in reach."""
+    (tmp_path / "configs").symlink_to(request.config.rootpath / "configs")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def refused(capsys, *argv: str) -> str:
+    """The one line that a command line is refused with."""
+    assert cli.main(argv) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 1 and lines[0].startswith("jaxbiped: ")
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (["walk"], ["must be one of compare, run, plan, report", "walk"]),
+        (["run"], ["Missing", "PATH"]),
+        (["run", SCENE, "--speed", "3"], ["Unrecognized", "--speed"]),
+        (["run", SCENE, "--strategy", "brave"], ["--strategy", "brave", "floor_only"]),
+        (["run", SCENE, "--costs.c1", "-4"], ["--costs.c1", "greater than or equal to 0", "-4"]),
+        (["run", SCENE, "--costs.c1", "nan"], ["--costs.c1", "finite", "nan"]),
+        (["run", SCENE, "--costs.c1", "cheap"], ["--costs.c1", "cheap"]),
+        (["run", SCENE, "--seed", "-1"], ["--seed", "greater than or equal to 0"]),
+        (["run", SCENE, "--pitch", "0.03"], ["pitch", "must divide", "0.03"]),
+        (["run", SCENE, "--robot.standing", "0.2"], ["--robot", "must rise"]),
+        (["run", SCENE, "--camera.columns", "60"], ["--camera", "must divide"]),
+        (["run", "missing.toml"], ["missing.toml", "no such file"]),
+        (["compare", "missing.toml"], ["missing.toml", "no such file"]),
+        (["compare", "--arenas", "0"], ["--arenas", "greater than or equal to 1"]),
+        (["compare", "--pitch", "0.03"], ["pitch", "must divide", "0.03"]),
+        (["compare", "--strategies", "full", "full"], ["named once"]),
+        (["compare", "--sensor", "lidar"], ["--sensor", "lidar", "raycast"]),
+        (["compare", "--executor", "robot"], ["--executor", "robot", "kinematic"]),
+        (["report", "nowhere"], ["nowhere"]),
+    ],
+)
+def test_options(here, capsys, argv, said):
+    line = refused(capsys, *argv)
+    assert all(part in line for part in said), line
+    assert sorted(path.name for path in here.iterdir()) == ["configs"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("arenas = 'many'", ["study.toml", "arenas", "many"]),
+        ("arena = 5", ["study.toml", "arena:", "unknown key"]),
+        ("families = ['bump', 'hole']", ["study.toml", "families.1", "hole"]),
+        ("[mission.costs]\nc1 = nan", ["study.toml", "mission.costs.c1", "finite"]),
+        ("[mission.costs]\nc5 = 1", ["study.toml", "mission.costs.c5", "unknown key"]),
+        ("[mission]\npitch = -1", ["study.toml", "mission.pitch", "greater than 0"]),
+        ("arenas = ", ["study.toml", "not valid TOML"]),
+    ],
+)
+def test_study_file(here, capsys, text, said):
+    (here / "study.toml").write_text(text)
+    line = refused(capsys, "compare", "study.toml")
+    assert all(part in line for part in said), line
+
+
+def test_no_text(here, capsys):
+    (here / "study.toml").write_bytes(b"\xff\xfe\x00")
+    assert "cannot be read as text" in refused(capsys, "compare", "study.toml")
+
+
+@pytest.mark.parametrize("command", [["run", SCENE], ["compare", "--arenas", "6"]])
+def test_folder_that_exists(here, capsys, command):
+    (here / "mine").mkdir()
+    (here / "mine" / "work.txt").write_text("precious")
+    line = refused(capsys, *command, "--out", "mine")
+    assert "mine" in line and "out" in line
+    assert (here / "mine" / "work.txt").read_text() == "precious"
+
+
+def full_disk(*_, **__):
+    raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_full_disk_while_running(here, capsys, monkeypatch):
+    monkeypatch.setattr(files.os, "fsync", full_disk)
+    assert cli.main(["run", SCENE, "--out", "mine"]) == 2
+    assert "mine" in (line := capsys.readouterr().err.strip()) and "space" in line.lower() and "\n" not in line
+    assert sorted(path.name for path in here.iterdir()) == ["configs"]
+
+
+def test_full_disk_while_comparing(here, capsys, monkeypatch):
+    monkeypatch.setattr(files.os, "fsync", full_disk)
+    assert "space" in refused(capsys, "compare", "--arenas", "6", "--out", "mine").lower()
+    assert sorted(path.name for path in here.iterdir()) == ["configs"]
+
+
+def test_run_writes_its_folder(here, capsys):
+    assert cli.main(["run", SCENE, "--out", "mine"]) == 0
+    printed = capsys.readouterr().out
+    assert "Step-up-bump" in printed and "reached" in printed
+    assert {path.name for path in (here / "mine").iterdir()} == {"map.png", "mission.gif", "mission.json"}
+    told = json.loads((here / "mine" / "mission.json").read_text())
+    assert told["code"] == "reached" and f"{100 * told['distance']:.0f} cm" in printed
+
+
+def test_compare_writes_its_folder_and_report_reads_it(here, capsys):
+    argv = ["compare", "--arenas", "6", "--strategies", "full", "floor_only", "--out", "mine"]
+    assert cli.main(argv) == 0
+    rows = pl.read_parquet(here / "mine" / "rows")
+    assert rows.schema == SCHEMA and len(rows) == 12
+    manifest = json.loads((here / "mine" / "manifest.json").read_text())
+    assert manifest["state"] == "finished" and manifest["arenas"] == 6 and "out" not in manifest["config"]
+    summary = (here / "mine" / "summary.md").read_text()
+    assert cli.main(["report", "mine"]) == 0
+    assert (here / "mine" / "summary.md").read_text() == summary
+    assert "full" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("command", sorted(cli.COMMANDS))
+def test_help(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main([command, "--help"])
+    assert stop.value.code == 0 and "usage: jaxbiped " + command in capsys.readouterr().out
+
+
+def test_usage(capsys):
+    assert cli.main(["--help"]) == 0 and "compare" in capsys.readouterr().out
+    assert cli.main([]) == 2
+    assert cli.main(["--version"]) == 0
