@@ -11,13 +11,13 @@ from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.errors import InputError
-from jaxbiped.planning import kernels
+from jaxbiped.planning import kernels, worklist
 from jaxbiped.planning.costs import Costs, Rules, half_edges
 
 CHUNK = 128  # arenas relaxed together at most: what fits the cache, and few enough that a slow map holds few others
 LANES = 80  # and at least, made up with copies: compilers unroll loops of up to 64 and then leave them unvectorised
 FEW = 16  # below this many the copies cost more than they save
-SINGLE_CELLS = 1200  # grids up to this size are summed in float32, larger ones in float64 (see `_solve`)
+LARGE = 1200  # cells; larger grids are summed in float64 (see `_solve`)
 
 
 @jax.tree_util.register_dataclass
@@ -48,7 +48,7 @@ def cost_to_go(
         last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
         return _solve(tuple(last), goal, method, valid)
 
-    return _by_chunks(chunk, (edges, goal_ij))
+    return _by_chunks(chunk, (edges, goal_ij), _is_large(edge_costs))
 
 
 def field(
@@ -75,7 +75,12 @@ def field(
         costs = jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs)
         return _solve(half_edges(*last, costs, rules), goal, method, valid)
 
-    return _by_chunks(chunk, (jnp.asarray(classes), jnp.asarray(levels), each, jnp.asarray(goal_ij)))
+    inputs = jnp.asarray(classes), jnp.asarray(levels), each, jnp.asarray(goal_ij)
+    return _by_chunks(chunk, inputs, _is_large(classes))
+
+
+def _is_large(grids) -> bool:
+    return grids.shape[-2] * grids.shape[-1] > LARGE
 
 
 def _solve(edges, goal_ij, method, valid) -> CostToGo:
@@ -84,21 +89,26 @@ def _solve(edges, goal_ij, method, valid) -> CostToGo:
     method = kernels.default_method() if method == "auto" else method
     # Sums along a path drift by up to half a unit in the last place a move: with float32 a path through a
     # large maze is off by more than 1e-5, so the kernels alone are then float64, in any program.
-    large = edges[0].shape[0] * edges[0].shape[1] > SINGLE_CELLS
+    large = _is_large(edges[0][1:-1, 1:-1, 0])
     with jax.enable_x64(large):
-        if large:
-            edges = tuple(e.astype(jnp.float64) for e in edges)
-        cost, steps, converged = kernels.settle(method, edges, goal_ij)
-        cost, steps = jnp.moveaxis(cost.astype(jnp.float32), -1, 0), steps.astype(jnp.int32)
+        dtype = jnp.float64 if large else jnp.float32
+        if large and method == "line_sweep" and goal_ij.shape[0] == 1:
+            cost, steps, converged = worklist.settle(edges, goal_ij, dtype)
+        else:
+            cost, steps, converged = kernels.settle(method, edges, goal_ij, dtype)
+        cost, steps = jnp.moveaxis(cost[1:-1, 1:-1].astype(jnp.float32), -1, 0), steps.astype(jnp.int32)
     converged &= valid
     return CostToGo(jnp.where(converged[:, None, None], cost, jnp.inf), steps, converged)
 
 
-def _by_chunks(solve, inputs):
+def _by_chunks(solve, inputs, large):
     """`solve(*inputs)` in chunks of the leading axis, one after the other, each stopping by itself."""
     batch = inputs[0].shape[0]
-    chunks = max(-(-batch // CHUNK), 1)
-    size = batch if batch < FEW else max(-(-batch // chunks), LANES)
+    if batch < FEW:
+        chunks, size = (batch, 1) if large else (1, batch)
+    else:
+        chunks = -(-batch // CHUNK)
+        size = max(-(-batch // chunks), LANES)
     pad = chunks * size - batch
     parts = jax.tree.map(lambda a: jnp.pad(a, ((0, pad),) + ((0, 0),) * (a.ndim - 1), mode="edge"), inputs)
     if chunks == 1:

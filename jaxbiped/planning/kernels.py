@@ -57,16 +57,17 @@ def line_sweep(edges, state, step):
     Each row relaxes from the row before and along itself, rightwards and then leftwards, so that a path which
     never turns back settles in one pass. After a pass all moves but those towards the other side are settled:
     a pass that changes nothing, after one the other way, ends the search. `rows` are those that the last pass
-    changed: a row is skipped unless the row before is one of them or has just changed.
+    changed (at first, those of the goals): a row is skipped unless the row before is one of them or has just
+    changed.
     """
     cost, rows = state
     height, width, batch = cost.shape[0] - 2, cost.shape[1] - 2, cost.shape[2]
-    up, first = step % 2 == 1, step == 0
+    up = step % 2 == 1
     side = jnp.where(up, 1, -1)  # where the row before lies
     none = jnp.full((1, batch), jnp.inf, cost.dtype)
 
     def one(array, i, j):
-        return take(array, (i, j, 0), (1, 1, batch))[0]
+        return take(array, (i, j, 0), (1, 1, batch))[0].astype(cost.dtype)
 
     def west(i, j):
         return one(edges[0], i, j - 1) if len(edges) == 4 else one(edges[4], i, j)
@@ -79,7 +80,8 @@ def line_sweep(edges, state, step):
     def row(n, state):
         cost, rows_now, before, changed, fresh = state
         i = jnp.where(up, height - n, n + 1)
-        active = first | (take(rows, (i + side,), (1,))[0] > 0) | (fresh > 0)
+        seed = jnp.where(step == 0, take(rows, (i,), (1,))[0], 0.0)
+        active = (take(rows, (i + side,), (1,))[0] > 0) | (fresh > 0) | (seed > 0)
         cells = jnp.where(active, width, 0)
 
         def rightwards(n, state):
@@ -100,9 +102,8 @@ def line_sweep(edges, state, step):
         line = take(cost, (i, 0, 0), (1, width + 2, batch))[0]
         line, _ = lax.fori_loop(0, cells, rightwards, (line, none))
         line, _, now = lax.fori_loop(0, cells, leftwards, (line, none, jnp.zeros((1, batch), jnp.float32)))
-        fresh = jnp.max(now)
-        seed = jnp.where(first, take(rows, (i,), (1,))[0], 0.0)
-        rows_now = put(rows_now, jnp.maximum(fresh, seed)[None], (i,))
+        fresh = jnp.maximum(jnp.max(now), seed)
+        rows_now = put(rows_now, fresh[None], (i,))
         return put(cost, line[None], (i, 0, 0)), rows_now, line, jnp.maximum(changed, now), fresh
 
     blank = jnp.full((width + 2, batch), jnp.inf, cost.dtype)
@@ -122,7 +123,7 @@ def wavefront(edges, state, step):
     new = inner = at(cost, 0, 0)
     for k in range(8):
         edge = at(edges[k], 0, 0) if k < len(edges) else at(edges[k - 4], DI[k], DJ[k])
-        new = least(new, at(cost, DI[k], DJ[k]) + edge)
+        new = least(new, at(cost, DI[k], DJ[k]) + edge.astype(cost.dtype))
     return (cost.at[1:-1, 1:-1].set(new), rows), jnp.any(new < inner, axis=(0, 1))
 
 
@@ -134,11 +135,11 @@ def default_method() -> str:
     return "line_sweep" if jax.default_backend() == "cpu" else "wavefront"
 
 
-def settle(method, edges, goal_ij):
-    """Relax until nothing changes: (cost [H, W, B], steps until nothing changed [B], converged [B]).
+def settle(method, edges, goal_ij, dtype, most=None):
+    """Relax until nothing changes: (cost [H + 2, W + 2, B], steps until nothing changed [B], converged [B]).
 
-    Every step settles one more cell of each least path at least, and every pass of line sweeps a row's worth
-    and more, so that H * W steps always do; the bound is there for input that no argument covers.
+    Costs are summed as `dtype`. Every step settles one more cell of each least path at least, and every pass of
+    line sweeps a row's worth and more, so that H * W steps always do: that is the bound, unless `most` is less.
     """
     height, width, batch = edges[0].shape
     relax = one_function(METHODS[method]) if method == "line_sweep" else METHODS[method]
@@ -146,11 +147,11 @@ def settle(method, edges, goal_ij):
     inside = (goal_ij >= 0).all(-1) & (goal_ij[:, 0] < height - 2) & (goal_ij[:, 1] < width - 2)
     start = inside & (rows == goal_ij[:, 0] + 1) & (columns == goal_ij[:, 1] + 1)
     goal_rows = start.any((1, 2)).astype(jnp.float32)
-    start = jnp.where(start, 0.0, jnp.inf).astype(edges[0].dtype), goal_rows
+    start = jnp.where(start, 0.0, jnp.inf).astype(dtype), goal_rows
 
     def again(state):
         _, changed, _, step = state
-        return (jnp.any(changed) & (step < height * width)) | (step < 2)
+        return (jnp.any(changed) & (step < (most or height * width))) | (step < 2)
 
     def body(state):
         cost, _, steps, step = state
@@ -159,4 +160,4 @@ def settle(method, edges, goal_ij):
 
     state = start, jnp.ones((batch,), bool), jnp.zeros((batch,), jnp.int32), jnp.int32(0)
     (cost, _), changed, steps, _ = lax.while_loop(again, body, state)
-    return cost[1:-1, 1:-1], steps, ~changed
+    return cost, steps, ~changed

@@ -159,3 +159,19 @@ def test_mazes(size):
     out = planning.field(classes, 0 * classes, goal_ij=goal_ij)
     edges = np.asarray(planning.edge_costs(classes, 0 * classes))[0]
     np.testing.assert_allclose(out.cost[0], oracle.cost_to_go(edges, goal_ij[0]), rtol=RELATIVE)
+
+
+def test_the_list_ends_what_sweeps_leave():
+    """One large map of single cells thrown at random, with one-way and free moves: no order of rows fits it."""
+    rng = np.random.default_rng(8)
+    edges = rng.uniform(0, 5, (2, 8, 40, 50)).astype(np.float32)
+    edges[rng.random(edges.shape) < 0.1] = 0
+    edges[rng.random(edges.shape) < 0.5] = np.inf
+    goal_ij = np.array([[3, 4], [20, 48]])
+    out = planning.cost_to_go(edges, goal_ij, method="line_sweep")
+    assert out.converged.all()
+    for b in range(2):
+        np.testing.assert_allclose(out.cost[b], oracle.cost_to_go(edges[b], goal_ij[b]), rtol=RELATIVE)
+    # the same many at once, where sweeps go on to the end
+    many = planning.cost_to_go(edges[[0] * 20], goal_ij[[0] * 20], method="line_sweep")
+    np.testing.assert_array_equal(many.cost[7], out.cost[0])
