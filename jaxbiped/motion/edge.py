@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.mapping.grid import Cell
 
-WINDOW = 0.175  # [m] half side of the square of cells that the direction is fitted to
+WINDOW = 0.20  # [m] half side of the square of cells that the direction is fitted to; four cells of 5 cm
 
 
 def crossing_direction(
@@ -49,5 +49,5 @@ def crossing_direction(
     normal = jnp.arctan2(jnp.sum(mean_free * di), jnp.sum(mean_free * dj))
     ahead = jnp.arctan2(step_ij[0].astype(jnp.float32), step_ij[1].astype(jnp.float32))
     off = jnp.mod(normal - ahead + jnp.pi, 2 * jnp.pi) - jnp.pi
-    seen = jnp.sum(jnp.abs(mean_free)) > 0
+    seen = jnp.any(weight > 0) & jnp.any(weight < 0)
     return jnp.where(seen & (jnp.abs(off) < jnp.deg2rad(50.0)), normal, ahead)
