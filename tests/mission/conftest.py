@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, partial
 
 import jax
 import jax.numpy as jnp
@@ -11,12 +10,13 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
-from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, compile_queue, stack
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.state import start
+from jaxbiped.mission.state import World, start
+from jaxbiped.mission.stepped import turn_once
 from jaxbiped.mission.strategies import STRATEGIES
+from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
 from jaxbiped.study.evaluate import draw
 
@@ -55,35 +55,27 @@ def play(arenas, settings, seeds, program=PROGRAM, slots=SLOTS):
 
 @dataclass(frozen=True)
 class Log:
-    """`T` decisions of `B` missions, and their end."""
+    """`T` decisions of one mission, and its end."""
 
-    running: np.ndarray  # [T, B] the mission had not ended before this decision
-    classes: np.ndarray  # [T, B, H, W]
-    levels: np.ndarray  # [T, B, H, W]
-    votes: np.ndarray  # [T, B, H, W, 4]
-    command: object  # leaves [T, B]
-    world: object  # [B]
-
-
-@cache
-def compiled_cycle(program):
-    return jax.jit(partial(cycle, program=program))
+    classes: np.ndarray  # [T, H, W]
+    levels: np.ndarray  # [T, H, W]
+    votes: np.ndarray  # [T, H, W, 4]
+    command: Command  # leaves [T]
+    world: World  # at the end
 
 
-def step_through(arenas, settings, seeds, program=PROGRAM, batch=JOBS) -> Log:
-    """The same missions by a Python loop over `cycle`, all side by side."""
-    count = len(arenas)
-    arena, setting = (jax.tree.map(jnp.asarray, pad(trees, batch)) for trees in (arenas, settings))
-    seed = jnp.asarray(np.array([*seeds, *seeds[:1] * (batch - count)], np.uint32))
-    begin = jax.jit(jax.vmap(partial(start, spec=program.spec)))
-    world, mind = begin(arena, setting, seed)
+def step_through(arena, setting, seed, program=PROGRAM) -> Log:
+    """One mission by a Python loop over `cycle`, alone in its batch, as the package's stepped driver has it."""
+    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (arena, setting))
+    world, mind = compiled_start(*batch, jnp.asarray([seed]), program.spec)
     moments = []
-    while np.any(np.asarray(world.code)[:count] == Code.RUNNING):
-        running = np.asarray(world.code) == Code.RUNNING
-        world, mind, _, command, thought = compiled_cycle(program)(world, mind, arena, setting)
-        moment = running, thought.classes, thought.levels, mind.grid_map.votes, command
-        moments.append(row(moment, slice(count)))
-    return Log(*stack(moments), row(world, slice(count)))
+    while world.code[0] == Code.RUNNING:
+        world, mind, _, command, thought = turn_once(world, mind, *batch, program)
+        moments.append(row((thought.classes, thought.levels, mind.grid_map.votes, command), 0))
+    return Log(*stack(moments), row(world, 0))
+
+
+compiled_start = jax.jit(jax.vmap(start, in_axes=(0, 0, 0, None)), static_argnums=3)
 
 
 @pytest.fixture(scope="session")
@@ -107,5 +99,5 @@ def played(population):
 
 @pytest.fixture(scope="session")
 def stepped(population):
-    """The population's missions by the stepped driver."""
-    return step_through(*population[:3])
+    """The population's missions by the stepped driver: a log each."""
+    return [step_through(*each) for each in zip(*population[:3], strict=True)]

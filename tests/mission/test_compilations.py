@@ -1,0 +1,81 @@
+"""What is compiled anew when numbers change: nothing."""
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped import planning
+from jaxbiped.mission.oracle import oracle_plan
+from jaxbiped.mission.queue import stack
+from tests.mission.conftest import PROGRAM, SETTINGS, pad, play
+
+EVENTS = []
+jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: EVENTS.append(event))
+
+
+def traced_or_compiled():
+    """Traces and compilations of this process so far."""
+    return [event for event in EVENTS if event.startswith("/jax/core/compile/")]
+
+
+def vectors(setting, count, seed):
+    """Settings with random costs."""
+    draws = np.random.default_rng(seed).uniform(0.1, 30, (count, 5)).astype(np.float32)
+    return [replace(setting, costs=planning.Costs(*draw)) for draw in draws]
+
+
+@pytest.fixture(scope="module")
+def warm(population, played):
+    """A setting, with everything compiled once."""
+    setting = population[1][0]
+    return setting
+
+
+def test_sweep_over_64_cost_vectors_compiles_nothing(population, warm):
+    arenas, _, seeds, _ = population
+    play(arenas[:SETTINGS], vectors(warm, SETTINGS, 9), seeds[:SETTINGS])
+    before = len(traced_or_compiled())
+    outcomes = []
+    for part in range(64 // SETTINGS):
+        outcomes.append(play(arenas[:SETTINGS], vectors(warm, SETTINGS, part), seeds[:SETTINGS]))
+    assert traced_or_compiled()[before:] == []
+    assert len({tuple(outcome.time.tolist()) for outcome in outcomes}) > 1  # the costs did count
+
+
+def test_other_numbers_compile_nothing(population, warm):
+    """Strategy, noise, thresholds, limits, body, camera: all are traced."""
+    arenas, settings, seeds, _ = population
+    before = len(traced_or_compiled())
+    other = jax.tree.map(lambda leaf: leaf if leaf.dtype == bool else (leaf * leaf.dtype.type(1)), warm)
+    other = replace(
+        other,
+        body=replace(other.body, radius=np.float32(0.09)),
+        camera=replace(other.camera, pitch=np.float32(0.6)),
+        mapping=replace(other.mapping, view_points=np.float32(6)),
+        limits=replace(other.limits, max_decisions=np.int32(9)),
+        odometry=replace(other.odometry, forward=np.float32(0.01)),
+    )
+    result = play(arenas[:8], [other] * 4 + settings[:4], seeds[:8])
+    assert traced_or_compiled()[before:] == []
+    assert result.decisions[:4].max() <= 9
+
+
+def test_oracle_plan_and_field_compile_once(population, warm):
+    arenas = jax.tree.map(jnp.asarray, pad(population[0], 24))
+    field = jax.jit(planning.field)
+    classes = jnp.ones((4, 6, 7), jnp.int8)
+
+    def both(seed):
+        points = jax.tree.map(jnp.asarray, stack(vectors(warm, 4, seed)))
+        plan = oracle_plan(arenas, points, PROGRAM)
+        costs = jax.tree.map(jnp.asarray, points.costs)
+        return plan.cost, field(classes, classes * 0, costs, planning.Rules(), jnp.zeros((4, 2), jnp.int32)).cost
+
+    first = both(0)
+    before = len(traced_or_compiled())
+    second = both(1)
+    assert traced_or_compiled()[before:] == []
+    assert not np.allclose(first[0], second[0]) and not np.allclose(first[1], second[1])
