@@ -109,6 +109,7 @@ def half_edges(
     return tuple(edges(k) for k in range(4))
 
 
+@jax.jit
 def edge_costs(
     classes: Int[Array | np.ndarray, "B H W"],
     levels: Int[Array | np.ndarray, "B H W"],

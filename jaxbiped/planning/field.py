@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -14,9 +17,10 @@ from jaxbiped.errors import InputError
 from jaxbiped.planning import kernels, worklist
 from jaxbiped.planning.costs import Costs, Rules, half_edges
 
-CHUNK = 128  # arenas relaxed together at most: what fits the cache, and few enough that a slow map holds few others
-LANES = 80  # and at least, made up with copies: compilers unroll loops of up to 64 and then leave them unvectorised
-FEW = 16  # below this many the copies cost more than they save
+# Arenas relaxed together, at least and at most, on small and on large grids: what fits the cache, and few enough that
+# a slow map holds few others. At least: compilers unroll short loops over the batch and then leave them unvectorised,
+# so that a batch is made up with copies, unless there are so FEW that the copies cost more.
+LANES, LANES_LARGE, FEW = (80, 128), (32, 32), 16
 LARGE = 1200  # cells; larger grids are summed in float64 (see `_solve`)
 
 
@@ -40,15 +44,7 @@ def cost_to_go(
       goal_ij: row and column; a goal outside the grid is reached from nowhere.
       method: "line_sweep", "wavefront", or "auto" (by platform).
     """
-    edges, goal_ij = jnp.asarray(edge_costs), jnp.asarray(goal_ij)
-
-    def chunk(edges, goal):
-        valid = (edges >= 0).all((1, 2, 3))
-        edges = jnp.where(valid[:, None, None, None], edges, jnp.inf)
-        last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
-        return _solve(tuple(last), goal, method, valid)
-
-    return _by_chunks(chunk, (edges, goal_ij), _is_large(edge_costs))
+    return _on_all_cores(_cost_to_go, (edge_costs, goal_ij), _method(method))
 
 
 def field(
@@ -61,22 +57,64 @@ def field(
 ) -> CostToGo:
     """`cost_to_go` of `edge_costs`, without ever holding all edge costs: the fast path.
 
-    Arguments as there. May be called inside jit. An arena's result does not depend on the others of its batch.
+    Arguments as there. May be called inside jit, where its chunks run one after the other; called from outside
+    on a CPU they go to all cores. An arena's result does not depend on the others of its batch.
     """
     if goal_ij is None:
         raise InputError("must be given", field="goal_ij")
-    batch = classes.shape[0]
-    each = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (batch,)), (costs or Costs(), rules or Rules()))
+    each = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, classes.shape[:1]), (costs or Costs(), rules or Rules()))
+    return _on_all_cores(_field, (classes, levels, each, goal_ij), _method(method))
 
+
+@partial(jax.jit, static_argnums=1)
+def _cost_to_go(inputs, method: str) -> CostToGo:
+    def chunk(edges, goal):
+        valid = (edges >= 0).all((1, 2, 3))  # False for NaN as well
+        edges = jnp.where(valid[:, None, None, None], edges, jnp.inf)
+        last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
+        return _solve(tuple(last), goal, method, valid)
+
+    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
+
+
+@partial(jax.jit, static_argnums=1)
+def _field(inputs, method: str) -> CostToGo:
     def chunk(classes, levels, each, goal):
         costs, rules = each
         last = (jnp.moveaxis(a, 0, -1) for a in (classes, levels))
-        valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)  # False for NaN as well
+        valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)
         costs = jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs)
         return _solve(half_edges(*last, costs, rules), goal, method, valid)
 
-    inputs = jnp.asarray(classes), jnp.asarray(levels), each, jnp.asarray(goal_ij)
-    return _by_chunks(chunk, inputs, _is_large(classes))
+    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
+
+
+def _method(name: str) -> str:
+    if name not in ("auto", *kernels.METHODS):
+        raise InputError(f"must be one of auto, {', '.join(kernels.METHODS)}", field="method", value=name)
+    return kernels.default_method() if name == "auto" else name
+
+
+def _on_all_cores(solve, inputs, method: str) -> CostToGo:
+    """`solve` on pieces of one chunk each, from as many threads as there are cores, if that is any use.
+
+    Loops of this kind are serial inside a program on a CPU; programs of several threads do run side by side.
+    """
+    batch, most = inputs[0].shape[0], (LANES_LARGE if _is_large(inputs[0]) else LANES)[1]
+    traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(inputs))
+    if traced or batch <= most or jax.default_backend() != "cpu":
+        return solve(jax.tree.map(jnp.asarray, inputs), method)
+    inputs = jax.tree.map(np.asarray, inputs)
+
+    def piece(start):
+        stop = min(start + most, batch)
+        short = jax.tree.map(lambda a: a[max(stop - most, 0) : stop], inputs)  # the last one overlaps: one program
+        out = jax.block_until_ready(solve(short, method))
+        return jax.tree.map(lambda a: np.asarray(a)[start - stop :], out)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        parts = list(pool.map(piece, range(0, batch, most)))
+    return jax.tree.map(lambda *pieces: jnp.asarray(np.concatenate(pieces)), *parts)
 
 
 def _is_large(grids) -> bool:
@@ -84,9 +122,6 @@ def _is_large(grids) -> bool:
 
 
 def _solve(edges, goal_ij, method, valid) -> CostToGo:
-    if method not in ("auto", *kernels.METHODS):
-        raise InputError(f"must be one of auto, {', '.join(kernels.METHODS)}", field="method", value=method)
-    method = kernels.default_method() if method == "auto" else method
     # Sums along a path drift by up to half a unit in the last place a move: with float32 a path through a
     # large maze is off by more than 1e-5, so the kernels alone are then float64, in any program.
     large = _is_large(edges[0][1:-1, 1:-1, 0])
@@ -104,11 +139,12 @@ def _solve(edges, goal_ij, method, valid) -> CostToGo:
 def _by_chunks(solve, inputs, large):
     """`solve(*inputs)` in chunks of the leading axis, one after the other, each stopping by itself."""
     batch = inputs[0].shape[0]
+    least, most = LANES_LARGE if large else LANES
     if batch < FEW:
         chunks, size = (batch, 1) if large else (1, batch)
     else:
-        chunks = -(-batch // CHUNK)
-        size = max(-(-batch // chunks), LANES)
+        chunks = -(-batch // most)
+        size = max(-(-batch // chunks), least)
     pad = chunks * size - batch
     parts = jax.tree.map(lambda a: jnp.pad(a, ((0, pad),) + ((0, 0),) * (a.ndim - 1), mode="edge"), inputs)
     if chunks == 1:

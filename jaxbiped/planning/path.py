@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -43,6 +44,7 @@ def pick(ahead: Float[Array, "B 8"], downhill: Bool[Array, "B 8"], heading: Int[
     return jnp.where(good.any(-1), choice, -1).astype(jnp.int8)
 
 
+@partial(jax.jit, static_argnames="max_length")
 def read_path(
     field: CostToGo,
     edge_costs: Float[Array | np.ndarray, "B 8 H W"],
@@ -102,6 +104,7 @@ def _shifted(array, di, dj):
     return padded[:, 1 + di : 1 + di + height, 1 + dj : 1 + dj + width]
 
 
+@partial(jax.jit, static_argnames="length")
 def next_step(
     field_cost: Float[Array | np.ndarray, "B H W"],
     classes: Int[Array | np.ndarray, "B H W"],
