@@ -9,6 +9,7 @@ posture on both feet (one standing, one squatting), so that chains of them have 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from dataclasses import dataclass
 
 import jax
@@ -143,6 +144,12 @@ def generate(request: Request, robot: RobotModelConfig, durations: np.ndarray | 
     biped = robot.traced()
     motion = perform(song.score(durations), biped, pendulum_height(request, robot))
     return tabulate(request, robot, song.names, durations, jax.device_get(motion))
+
+
+@functools.lru_cache(maxsize=64)
+def home_table(robot: RobotModelConfig, squatting: bool) -> PrimitiveTable:
+    """Standing, or squatting, still: the last row is the posture in which every primitive starts and ends."""
+    return generate(Request("home", squat_start=squatting, squat=squatting, squat_end=squatting, duration=1.0), robot)
 
 
 def pendulum_height(request: Request, robot: RobotModelConfig) -> Float[Array, ""]:

@@ -30,7 +30,7 @@ class Request:
     squat: bool = False  # while walking
     squat_end: bool = False
     duration: float = 16.0  # [s]
-    lean: float = 0.0  # [m] ahead of a foot's middle where it bears the weight on the upper ground, beyond an edge
+    lean: float = 0.0  # [m] off a foot's middle, away from the edge, where it bears the weight on the upper ground
 
     def __post_init__(self):
         for field in ("forward", "left", "turn", "rise", "duration", "lean"):

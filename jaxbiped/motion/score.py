@@ -15,11 +15,10 @@ from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.request import Request
 
 PHASES, RAMPS = 32, 96  # static sizes: what six pairs of steps need
-CHANNELS = ("zmp_x", "zmp_y", "load", "hip") + tuple(
-    f"{s}_{c}" for s in ("left", "right") for c in ("x", "y", "z", "yaw")
-)
+FEET = tuple(f"{side}_{c}" for side in ("left", "right") for c in ("x", "y", "z", "yaw"))
+CHANNELS = ("zmp_x", "zmp_y", "load", "hip", *FEET)
 CLEARANCE = 0.015  # [m] of a swinging foot above the higher of the two grounds
-SLACK = 0.003  # [m] that the stretched leg keeps short of straight
+SLACK = 0.006  # [m] that the stretched leg keeps short of straight
 SHORTEST_REST = 0.30  # [s] twice the pendulum's time constant: the centre of mass is at rest at both ends
 
 
@@ -83,6 +82,7 @@ def compose(request: Request, robot: RobotModelConfig) -> Composer:
     upright = {False: stance.standing, True: stance.squatting}
     begin, end = upright[request.squat_start], upright[request.squat_end]
     low = min(0.0, request.rise)
+    lean = math.copysign(request.lean, request.rise)
     walk = hip_height(request, robot)
     pairs = request.pairs
     song = Composer(_home(begin, offset))
@@ -104,7 +104,7 @@ def compose(request: Request, robot: RobotModelConfig) -> Composer:
             sign = 1.0 if side == "left" else -1.0
             other = "right" if side == "left" else "left"
             song.phase(f"shift to {other}", 1.0)
-            px, py = _pressure(song.now, other, request.lean if song.now[f"{other}_z"] > low + 1e-6 else 0.0)
+            px, py = _pressure(song.now, other, lean if song.now[f"{other}_z"] > low + 1e-6 else 0.0, stance.inward)
             song.to(zmp_x=px, zmp_y=py, load=1.0 if other == "left" else 0.0)
             song.phase(f"swing {side}", 1.1, (int(side == "left"), int(side == "right")))
             there = {
@@ -135,7 +135,7 @@ def hip_height(request: Request, robot: RobotModelConfig) -> float:
     moving = masses.torso + 1.5 * masses.thigh + 0.5 * masses.shank  # what of both legs goes with the pelvis
     lead = 1.0 + (masses.foot + 0.75 * masses.shank + 0.25 * masses.thigh) / moving
     ahead = lead * (abs(request.forward) / pairs + max(0.0, request.lean))
-    aside = masses.total / moving * body.hip_offset + lead * abs(request.left) / pairs
+    aside = masses.total / moving * (body.hip_offset - stance.inward) + lead * abs(request.left) / pairs
     left_over = (body.thigh + body.shank - SLACK) ** 2 - ahead**2 - aside**2
     return min(height, body.ankle_height + math.sqrt(max(0.0, left_over)))
 
@@ -158,10 +158,11 @@ def _home(hip: float, offset: float) -> dict[str, float]:
     return values | {"load": 0.5, "hip": hip, "left_y": offset, "right_y": -offset}
 
 
-def _pressure(now: dict[str, float], side: str, ahead: float) -> tuple[float, float]:
-    """Where a foot bears the whole weight: its middle, or `ahead` of it."""
-    yaw = now[f"{side}_yaw"]
-    return now[f"{side}_x"] + ahead * math.cos(yaw), now[f"{side}_y"] + ahead * math.sin(yaw)
+def _pressure(now: dict[str, float], side: str, ahead: float, inward: float) -> tuple[float, float]:
+    """Where a foot bears the whole weight: `ahead` of its middle and `inward` of it."""
+    cos, sin = math.cos(now[f"{side}_yaw"]), math.sin(now[f"{side}_yaw"])
+    left = -inward if side == "left" else inward
+    return now[f"{side}_x"] + ahead * cos - left * sin, now[f"{side}_y"] + ahead * sin + left * cos
 
 
 def channels(score: Score, time: Float[Array, "N"]) -> tuple[Float[Array, "N C"], Float[Array, "N 2"]]:

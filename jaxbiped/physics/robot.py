@@ -133,7 +133,7 @@ def _skin(body, half: tuple[float, float, float], pos: tuple[float, float, float
 
 def _torso_geoms(torso, config: RobotModelConfig) -> None:
     body = config.proportions
-    radius, half = 0.04, 0.035
+    radius, half = 0.04, 0.02
     middle, lens = 0.6 * body.torso_top, 0.015
     _skin(torso, (0.04, 0.06, 0.5 * body.torso_top), (0, 0, 0.5 * body.torso_top), LIGHT)
     _skin(torso, (0.01, 0.01, 0.5 * (body.camera_top - body.torso_top)),
