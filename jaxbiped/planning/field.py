@@ -74,7 +74,7 @@ def _cost_to_go(inputs, method: str) -> CostToGo:
         last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
         return _solve(tuple(last), goal, method, valid)
 
-    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
+    return _by_chunks(_whole(chunk, method), inputs, _is_large(inputs[0]))
 
 
 @partial(jax.jit, static_argnums=1)
@@ -86,7 +86,12 @@ def _field(inputs, method: str) -> CostToGo:
         costs = jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs)
         return _solve(half_edges(*last, costs, rules), goal, method, valid)
 
-    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
+    return _by_chunks(_whole(chunk, method), inputs, _is_large(inputs[0]))
+
+
+def _whole(chunk, method: str):
+    """All of a chunk's work as one function where the kernel is one: no core then waits for another."""
+    return kernels.one_function(chunk) if method == "line_sweep" else chunk
 
 
 def _method(name: str) -> str:

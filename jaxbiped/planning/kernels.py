@@ -142,7 +142,7 @@ def settle(method, edges, goal_ij, dtype, most=None):
     line sweeps a row's worth and more, so that H * W steps always do: that is the bound, unless `most` is less.
     """
     height, width, batch = edges[0].shape
-    relax = one_function(METHODS[method]) if method == "line_sweep" else METHODS[method]
+    relax = METHODS[method]
     rows, columns = (lax.broadcasted_iota(jnp.int32, (height, width, 1), a) for a in (0, 1))
     inside = (goal_ij >= 0).all(-1) & (goal_ij[:, 0] < height - 2) & (goal_ij[:, 1] < width - 2)
     start = inside & (rows == goal_ij[:, 0] + 1) & (columns == goal_ij[:, 1] + 1)

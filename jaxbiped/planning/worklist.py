@@ -22,8 +22,7 @@ ROUNDS = 64  # looks at each cell, on average, before giving up; costs of 1 to 1
 def settle(edges, goal_ij, dtype):
     """As `kernels.settle` with line sweeps, for a batch of one; steps are those of the sweeps."""
     cost, steps, converged = kernels.settle("line_sweep", edges, goal_ij, dtype, SWEEPS)
-    rest = kernels.one_function(finish)
-    cost, converged = lax.cond(converged[0], lambda _, cost: (cost, jnp.array([True])), rest, edges, cost)
+    cost, converged = lax.cond(converged[0], lambda _, cost: (cost, jnp.array([True])), finish, edges, cost)
     return cost, steps, converged
 
 
