@@ -22,6 +22,6 @@ class InputError(ValueError):
         super().__init__(" ".join(f"{place + ': ' if place else ''}{message}{got}".split()))
 
 
-def _short(value: object, limit: int = 80) -> str:
+def _short(value: object, limit: int = 200) -> str:
     text = repr(value)
     return text if len(text) <= limit else text[: limit - 3] + "..."
