@@ -1,0 +1,108 @@
+"""Checks of what people give to a backend: one clear line before anything is stepped or compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float64
+from mujoco.batch import MODEL_FIELDS
+
+from jaxbiped.errors import InputError
+
+
+def size(name: str, value: Any, least: int = 1) -> int:
+    """A whole number of at least `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"must be a whole number of at least {least}", field=name, value=value)
+    return int(value)
+
+
+def numbers(
+    name: str, value: Any, shape: tuple[int, ...], axes: str, mask: Bool[np.ndarray, "B"] | None = None
+) -> Float64[np.ndarray, "..."]:
+    """`value` as finite float64 of `shape`, where -1 is any length; only the rows of the mask need be finite."""
+    try:
+        array = np.asarray(value, np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"must be numbers of shape {axes}", field=name, value=value) from None
+    if array.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)):
+        wanted = ", ".join("any" if n == -1 else str(n) for n in shape)
+        raise InputError(f"must have shape {axes} = [{wanted}]", field=name, value=list(array.shape))
+    bad = ~np.isfinite(array)
+    if mask is not None:
+        bad[~mask] = False
+    if bad.any():
+        at = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise InputError(f"must be finite; at {axes} = {list(at)} it is not", field=name, value=float(array[at]))
+    return array
+
+
+def controls(value: Any, batch_size: int, model: mujoco.MjModel) -> Float64[np.ndarray, "B T nu"]:
+    """A control table [B, T, nu], T at least 1."""
+    table = numbers("controls", value, (batch_size, -1, model.nu), "[B, T, nu]")
+    if not table.shape[1]:
+        raise InputError("must hold at least one control", field="controls", value=list(table.shape))
+    return table
+
+
+def state(
+    qpos: Any, qvel: Any, batch_size: int, model: mujoco.MjModel, mask: Bool[np.ndarray, "B"] | None = None
+) -> tuple[Float64[np.ndarray, "B nq"], Float64[np.ndarray, "B nv"]]:
+    """Initial states, with the model's own where none is given; rows outside the mask are not looked at."""
+    if qpos is None:
+        qpos = np.tile(model.qpos0, (batch_size, 1))
+    if qvel is None:
+        qvel = np.zeros((batch_size, model.nv))
+    return (
+        numbers("qpos", qpos, (batch_size, model.nq), "[B, nq]", mask),
+        numbers("qvel", qvel, (batch_size, model.nv), "[B, nv]", mask),
+    )
+
+
+def every(count: int, record_every: int | None, hold: int) -> tuple[int, int]:
+    """Steps a record (all of them where None) and steps a control, of a table of `count` controls."""
+    hold = size("hold", hold)
+    steps = count * hold
+    interval = steps if record_every is None else size("record_every", record_every)
+    if steps % interval:
+        raise InputError(f"must divide the {steps} steps of the rollout", field="record_every", value=record_every)
+    return interval, hold
+
+
+def chosen(mask: Any, batch_size: int) -> Bool[np.ndarray, "B"]:
+    """A mask of simulations; all where it is None."""
+    if mask is None:
+        return np.ones(batch_size, bool)
+    array = np.asarray(mask)
+    if array.dtype != bool or array.shape != (batch_size,):
+        raise InputError(f"must be [B] = [{batch_size}] booleans", field="mask", value=mask)
+    return array
+
+
+def own(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """The model's own value of a field, or of an option by "opt.<name>"."""
+    holder, key = (model.opt, name[4:]) if name.startswith("opt.") else (model, name)
+    return np.asarray(getattr(holder, key))
+
+
+def field_name(model: mujoco.MjModel, name: str) -> str:
+    """A field that may differ by simulation: real numbers, of no consequence for sizes, time or names."""
+    if name not in MODEL_FIELDS:
+        raise InputError("must be the name of a field of mujoco.MjModel that has one value a simulation", field=name)
+    if own(model, name).dtype.kind != "f" or name in ("opt.timestep", "numeric_data"):
+        raise InputError("is the same in all simulations of a batch", field=name)
+    return name
+
+
+def fields(
+    values: Mapping[str, Any] | None, batch_size: int, model: mujoco.MjModel, mask: Bool[np.ndarray, "B"] | None = None
+) -> dict[str, Float64[np.ndarray, "B ..."]]:
+    """Model fields by name, each with a leading [B]."""
+    out = {}
+    for name, value in (values or {}).items():
+        shape = own(model, field_name(model, name)).shape
+        out[name] = numbers(f"fields.{name}", value, (batch_size, *shape), f"[B, *{name}.shape]", mask)
+    return out

@@ -1,0 +1,270 @@
+"""MuJoCo XLA: the same batches in JAX, on a GPU, a TPU or a CPU, in single precision.
+
+One function steps a block of up to `block` steps, and is compiled once a (model, batch size): tables of any length, any
+`record_every` and `hold`, and living batches all run through it. It is compiled anew only when a field differs by
+simulation for the first time that the option `fields` had not named.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pydantic
+from jaxtyping import Array, Float, Float64, Int
+from mujoco.batch import Batch
+
+from jaxbiped.errors import InputError
+from jaxbiped.physics import inputs
+from jaxbiped.physics.backend import WARNINGS, Rollout, State
+from jaxbiped.physics.engine import Engine
+from jaxbiped.physics.fields import Fields
+from jaxbiped.physics.model import Watched, load
+from jaxbiped.physics.options import Common
+
+# What MuJoCo derives from a model's inertias and frames and MJX reads; and the fields that none of it depends on.
+DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0", "tendon_invweight0", "actuator_acc0")
+UNDERIVED = ("geom_", "pair_", "site_", "opt.")
+
+
+class Options(Common):
+    """Of `physics.make("mjx", ...)`."""
+
+    device: Literal["cpu", "gpu", "tpu"] | None = None
+    """None: JAX's default."""
+    impl: Literal["jax", "warp"] = "jax"
+    """Who steps: MJX's own JAX, or MuJoCo Warp where the package warp-lang is installed."""
+    block: pydantic.PositiveInt = 32
+    """Most steps in one call to the device. The results do not depend on it."""
+
+
+class Mjx:
+    """See `Backend`. Results depend on the device and, in the last bits, on the batch size."""
+
+    name = "mjx"
+
+    def __init__(self, model: Any, batch_size: int, options: Options):
+        self.batch_size = inputs.size("batch_size", batch_size)
+        self.model = load(model, free_joint=options.free_joint, watch=options.watch)
+        self.watched = Watched.of(self.model, options.watch)
+        self.watches = self.watched.names
+        self.options = options
+        self.engine = Engine(self.model, options.impl, options.device)
+        self.names: tuple[str, ...] = ()  # fields that differ by simulation in the compiled function
+        self.add_names(options.fields)
+        # The fields of the living batch, and of rollouts, which leave it as it is.
+        self.living: Fields | None = None
+        self.scratch: Fields | None = None
+        self.overrides: dict[str, Array] | None = None  # of the living batch; None: to be made
+        self.traces = 0  # of the one function that is dear to compile
+        self.block = jax.jit(self.traced_block)
+        self.start = jax.jit(self.traced_start)
+        with jax.default_device(self.engine.device):
+            self.data = jax.tree.map(lambda x: jnp.tile(x, (self.batch_size, *[1] * x.ndim)), self.engine.empty)
+            self.warned = self.unwarned()
+        self.steps = np.zeros(self.batch_size, np.int64)  # since each reset
+
+    def rollout(
+        self,
+        controls: Any,
+        qpos: Any = None,
+        qvel: Any = None,
+        fields: Mapping[str, Any] | None = None,
+        record_every: int = 1,
+        hold: int = 1,
+    ) -> Rollout:
+        """See `Backend.rollout`."""
+        table = inputs.controls(controls, self.batch_size, self.model)
+        start = inputs.state(qpos, qvel, self.batch_size, self.model)
+        values = inputs.fields(fields, self.batch_size, self.model)
+        every, hold = inputs.every(table.shape[1], record_every, hold)
+        self.add_names(values)
+        if self.names:
+            self.scratch = self.scratch or Fields(Batch(self.model, self.batch_size))
+            self.scratch.only(values)
+        data = self.start(np.ones(self.batch_size, bool), self.data, *start)
+        count = table.shape[1] * hold // every
+        nq, nqv, width = self.model.nq, self.model.nq + self.model.nv, self.row_width()
+        records = np.empty((self.batch_size, count, width), self.data.qpos.dtype)
+        warned, depth = self.unwarned(), self.untouched()
+        overrides, waiting = self.overridden(self.scratch), None
+        for begin, steps, block in self.blocks(table, hold):
+            data, warned, depth, rows = self.block(
+                self.engine.model, overrides, data, warned, depth, block, np.int32(steps)
+            )
+            # The device goes on with this block while the records of the one before are copied.
+            self.collect(records, every, waiting)
+            waiting = begin, steps, rows
+        self.collect(records, every, waiting)
+        warned, depth = np.asarray(warned), np.asarray(depth)
+        return Rollout(
+            time=np.arange(1, count + 1) * (every * self.model.opt.timestep),
+            qpos=records[..., :nq],
+            qvel=records[..., nq:nqv],
+            sensordata=records[..., nqv:],
+            valid=~warned.any(axis=1),
+            warnings=warned,
+            touched=depth >= 0,
+            depth=np.maximum(depth, 0.0),
+        )
+
+    def reset(self, mask: Any = None, qpos: Any = None, qvel: Any = None) -> State:
+        """See `Backend.reset`."""
+        chosen = inputs.chosen(mask, self.batch_size)
+        start = inputs.state(qpos, qvel, self.batch_size, self.model, chosen)
+        self.data = self.start(chosen, self.data, *start)
+        self.warned = jnp.where(chosen[:, None], 0, self.warned)
+        self.steps = np.where(chosen, 0, self.steps)
+        return self.state(self.untouched())
+
+    def set_fields(self, fields: Mapping[str, Any], mask: Any = None) -> None:
+        """See `Backend.set_fields`."""
+        chosen = inputs.chosen(mask, self.batch_size)
+        values = inputs.fields(fields, self.batch_size, self.model, chosen)
+        self.add_names(values)
+        self.living = self.living or Fields(Batch(self.model, self.batch_size))
+        self.living.write(values, np.flatnonzero(chosen))
+        self.overrides = None
+
+    def advance(self, controls: Any, hold: int = 1) -> State:
+        """See `Backend.advance`."""
+        table = inputs.controls(controls, self.batch_size, self.model)
+        steps, hold = inputs.every(table.shape[1], None, hold)
+        depth = self.untouched()
+        if self.overrides is None:
+            self.overrides = self.overridden(self.living)
+        for _, count, block in self.blocks(table, hold):
+            self.data, self.warned, depth, _ = self.block(
+                self.engine.model, self.overrides, self.data, self.warned, depth, block, np.int32(count)
+            )
+        self.steps = self.steps + steps
+        return self.state(depth)
+
+    def compile(self) -> float:
+        """See `Backend.compile`."""
+        begin = time.perf_counter()
+        block = jnp.zeros((self.options.block, self.batch_size, self.model.nu))
+        overrides, data = self.overridden(self.living), self.data
+        out = self.block(self.engine.model, overrides, data, self.warned, self.untouched(), block, np.int32(0))
+        jax.block_until_ready(out)
+        return time.perf_counter() - begin
+
+    def add_names(self, names: Iterable[str]) -> None:
+        """Let these fields differ by simulation; those derived from them do too."""
+        for name in names:
+            inputs.field_name(self.model, name)
+            if not isinstance(self.engine.field(name), jax.Array):
+                raise InputError("is the same in all simulations of an mjx batch", field=f"fields.{name}")
+        wanted = set(names) - set(self.names)
+        if not wanted:
+            return
+        if any(not name.startswith(UNDERIVED) for name in wanted):
+            wanted |= {name for name in DERIVED if isinstance(self.engine.field(name), jax.Array)}
+        self.names = tuple(sorted(wanted | set(self.names)))
+        self.overrides = None
+
+    def overridden(self, fields: Fields | None) -> dict[str, Array]:
+        """The fields that differ by simulation, on the device."""
+        if not self.names:
+            return {}
+        source = fields or Fields(Batch(self.model, self.batch_size))
+        out = {}
+        for name in self.names:
+            like = self.engine.field(name)
+            rows = source.rows(name).astype(like.dtype).reshape(self.batch_size, *like.shape)
+            out[name] = jax.device_put(rows, self.engine.device)
+        return out
+
+    def blocks(
+        self, table: Float64[np.ndarray, "B T nu"], hold: int
+    ) -> Iterator[tuple[int, int, Float[np.ndarray, "L B nu"]]]:
+        """A table in blocks of one length: first step, number of steps, controls padded with zeros."""
+        length, steps = self.options.block, table.shape[1] * hold
+        for begin in range(0, steps, length):
+            count = min(length, steps - begin)
+            block = np.zeros((length, self.batch_size, self.model.nu), np.float32)
+            block[:count] = np.swapaxes(table[:, np.arange(begin, begin + count) // hold], 0, 1)
+            yield begin, count, block
+
+    @staticmethod
+    def collect(
+        records: Float[np.ndarray, "B R row"], every: int, block: tuple[int, int, Float[Array, "L B row"]] | None
+    ) -> None:
+        """Copy what is to be recorded of a block of steps, if there is one."""
+        if block is None:
+            return
+        begin, count, rows = block
+        keep = np.arange(-(begin + 1) % every, count, every)
+        if len(keep):
+            records[:, (begin + 1 + keep) // every - 1] = np.swapaxes(np.asarray(rows)[keep], 0, 1)
+
+    def traced_block(
+        self,
+        model: Any,
+        overrides: dict[str, Array],
+        data: Any,
+        warned: Int[Array, "B 8"],
+        depth: Float[Array, "B W"],
+        controls: Float[Array, "L B nu"],
+        steps: Int[Array, ""],
+    ) -> tuple[Any, Int[Array, "B 8"], Float[Array, "B W"], Float[Array, "L B row"]]:
+        """Step a batch `steps` times: its data, warnings, deepest contacts, and a record of each step."""
+        self.traces += 1
+
+        def one(own: dict[str, Array], data: Any, control: Float[Array, "nu"]) -> tuple[Any, Array, Array, Array]:
+            data = self.engine.step(model, own, data, control)
+            row = jnp.concatenate([data.qpos, data.qvel, data.sensordata[: self.watched.own]])
+            return data, self.engine.flags(data), self.watched.depths(data.sensordata, jnp), row
+
+        def step(k: Array, carry: tuple) -> tuple:
+            data, warned, depth, rows = carry
+            valid = ~jnp.any(warned, axis=1)
+            data, flags, touching, row = jax.vmap(one)(overrides, data, controls[k])
+            warned = warned + flags * valid[:, None]  # its first warnings only, as with the engine in C
+            valid = ~jnp.any(warned, axis=1)[:, None]
+            depth = jnp.where(valid, jnp.maximum(depth, touching), depth)
+            return data, warned, depth, rows.at[k].set(jnp.where(valid, row, jnp.nan))
+
+        rows = jnp.zeros((controls.shape[0], self.batch_size, self.row_width()), data.qpos.dtype)
+        return jax.lax.fori_loop(0, steps, step, (data, warned, depth, rows))
+
+    def traced_start(self, mask: Array, data: Any, qpos: Float[Array, "B nq"], qvel: Float[Array, "B nv"]) -> Any:
+        """The data of a batch with the simulations of a mask at the beginning."""
+        fresh = jax.vmap(lambda q, v: self.engine.empty.replace(qpos=q, qvel=v))(qpos, qvel)
+
+        def choose(new: Array, old: Array) -> Array:
+            return jnp.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+
+        return jax.tree.map(choose, fresh, data)
+
+    def state(self, depth: Float[Array, "B W"]) -> State:
+        """A copy of the living batch as it is."""
+        warned, depth = np.asarray(self.warned), np.asarray(depth)
+        valid = ~warned.any(axis=1)
+        blank = np.where(valid, 0.0, np.nan)[:, None].astype(self.data.qpos.dtype)
+        return State(
+            time=self.steps * self.model.opt.timestep,
+            qpos=np.asarray(self.data.qpos) + blank,
+            qvel=np.asarray(self.data.qvel) + blank,
+            sensordata=np.asarray(self.data.sensordata)[:, : self.watched.own] + blank,
+            valid=valid,
+            warnings=warned,
+            touched=depth >= 0,
+            depth=np.maximum(depth, 0.0),
+        )
+
+    def row_width(self) -> int:
+        """Numbers in the record of a step."""
+        return self.model.nq + self.model.nv + self.watched.own
+
+    def unwarned(self) -> Int[Array, "B 8"]:
+        """No warnings yet."""
+        return jnp.zeros((self.batch_size, len(WARNINGS)), jnp.int32, device=self.engine.device)
+
+    def untouched(self) -> Float[Array, "B W"]:
+        """No contacts yet."""
+        return jnp.full((self.batch_size, len(self.watches)), -np.inf, jnp.float32, device=self.engine.device)

@@ -1,0 +1,18 @@
+"""Options that all backends have."""
+
+from __future__ import annotations
+
+import pydantic
+
+from jaxbiped.config import Model
+
+
+class Common(Model):
+    """Of `physics.make`, whatever the backend."""
+
+    free_joint: bool = False
+    """Whether the model must have a free joint."""
+    watch: dict[str, tuple[tuple[str, str], ...]] = pydantic.Field(default_factory=dict)
+    """{name: pairs of geom names}: contacts that `touched` and `depth` report, a column a name."""
+    fields: tuple[str, ...] = ()
+    """Model fields that will differ by simulation, where that is known beforehand: `mjx` then compiles only once."""

@@ -1,0 +1,91 @@
+"""The native backend is MuJoCo, bit for bit."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from jaxbiped import physics
+from jaxbiped.errors import InputError
+from tests.physics.models import BATCH, HOPPER, PENDULUM, WATCH, hops
+from tests.physics.oracle import play
+
+
+def assert_exact(native, steps, hold, every, seed):
+    controls, qpos, qvel, fields = hops(native.model, steps, seed)
+    rolled = native.rollout(controls, qpos, qvel, fields, record_every=every, hold=hold)
+    assert rolled.valid.all() and not rolled.warnings.any()
+    for i in range(BATCH):
+        own = {name: value[i] for name, value in fields.items()}
+        want = play(HOPPER, np.repeat(controls[i], hold, axis=0), qpos[i], qvel[i], own, WATCH)
+        for got, expected in zip((rolled.qpos, rolled.qvel, rolled.sensordata), want, strict=False):
+            np.testing.assert_array_equal(got[i], expected[every - 1 :: every])
+        np.testing.assert_array_equal(rolled.touched[i], want[-1] >= 0)
+        np.testing.assert_allclose(rolled.depth[i], np.maximum(want[-1], 0), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(rolled.time, 0.005 * every * np.arange(1, steps * hold // every + 1))
+    return rolled
+
+
+def test_a_rollout_is_a_loop_of_steps(native):
+    rolled = assert_exact(native, 400, 1, 5, seed=0)
+    np.testing.assert_array_equal(rolled.touched, [[False, False], [True, False], [False, True], [False, False]])
+
+
+@settings(max_examples=8, deadline=None)
+@given(st.integers(1, 40), st.integers(1, 4), st.data())
+def test_any_length_hold_and_record(native, steps, hold, data):
+    every = data.draw(st.sampled_from([n for n in range(1, steps * hold + 1) if steps * hold % n == 0]))
+    assert_exact(native, steps, hold, every, seed=steps)
+
+
+def test_chunks_change_nothing(native, monkeypatch):
+    controls, qpos, qvel, fields = hops(native.model, 60)
+    whole = native.rollout(controls, qpos, qvel, fields, record_every=4)
+    monkeypatch.setattr("jaxbiped.physics.native.CHUNK", 700)  # 7 steps, which neither 60 nor 4 are multiples of
+    parts = native.rollout(controls, qpos, qvel, fields, record_every=4)
+    np.testing.assert_array_equal(whole.qpos, parts.qpos)
+    np.testing.assert_array_equal(whole.depth, parts.depth)
+
+
+def test_neither_threads_nor_company_matter(native):
+    controls, qpos, qvel, fields = hops(native.model, 100)
+    whole = native.rollout(controls, qpos, qvel, fields)
+    alone = physics.make("native", HOPPER, 1, threads=1, watch=WATCH)
+    for i in range(BATCH):
+        one = slice(i, i + 1)
+        own = {name: value[one] for name, value in fields.items()}
+        rolled = alone.rollout(controls[one], qpos[one], qvel[one], own)
+        np.testing.assert_array_equal(rolled.qpos[0], whole.qpos[i])
+
+
+@pytest.mark.parametrize(
+    ("memory", "warning"), [("2K", "contact_full"), ("4K", "constraint_full"), ("8K", "engine_error")]
+)
+def test_a_full_buffer_is_no_success(memory, warning, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    tight = physics.make("native", HOPPER.replace("<worldbody>", f'<size memory="{memory}"/><worldbody>', 1), 2)
+    qpos = np.tile(tight.model.qpos0, (2, 1))
+    qpos[1, 2] = 5.0  # it falls through free air, and never touches
+    rolled = tight.rollout(np.zeros((2, 100, 1)), qpos)
+    np.testing.assert_array_equal(rolled.valid, [False, True])
+    assert warning in physics.explain(rolled.warnings[0])
+    assert np.isnan(rolled.qpos[0, -1]).all() and np.isfinite(rolled.qpos[1]).all()
+    tight.reset(qpos=qpos)
+    state = tight.advance(np.zeros((2, 100, 1)))
+    np.testing.assert_array_equal(state.valid, [False, True])
+    np.testing.assert_array_equal(state.qpos[1], rolled.qpos[1, -1])
+    assert not list(tmp_path.iterdir()) and not capfd.readouterr().err  # the engine would print, and write a log
+
+
+def test_models_without_free_joint_sensors_or_watches():
+    pendulum = physics.make("native", PENDULUM, 2)
+    rolled = pendulum.rollout(np.full((2, 50, 1), 0.1))
+    assert rolled.qpos.shape == (2, 50, 1) and rolled.sensordata.shape == (2, 50, 0) and rolled.depth.shape == (2, 0)
+    zero, swing = pendulum.reset(qpos=[[0.0], [1.0]]), pendulum.advance(np.zeros((2, 10, 1)))
+    np.testing.assert_array_equal(zero.qpos, [[0.0], [1.0]])
+    assert swing.qpos[0] == 0 and 0 < swing.qpos[1] < 1
+
+
+def test_device():
+    with pytest.raises(InputError, match="native runs on a CPU"):
+        physics.make("native", PENDULUM, 2, device="gpu")
