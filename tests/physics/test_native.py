@@ -1,5 +1,6 @@
 """The native backend is MuJoCo, bit for bit."""
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -36,6 +37,41 @@ def test_a_rollout_is_a_loop_of_steps(native):
 def test_any_length_hold_and_record(native, steps, hold, data):
     every = data.draw(st.sampled_from([n for n in range(1, steps * hold + 1) if steps * hold % n == 0]))
     assert_exact(native, steps, hold, every, seed=steps)
+
+
+SHAPES = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 .1"/>
+    <geom name="sphere" type="sphere" size="{0} 0 0" pos="0 0 -1"/>
+    <geom name="capsule" type="capsule" size="{1} {2} 0" pos="1 0 -1"/>
+    <geom name="cylinder" type="cylinder" size="{3} {4} 0" pos="2 0 -1"/>
+    <geom name="ellipsoid" type="ellipsoid" size="{5} {6} {7}" pos="3 0 -1"/>
+    <geom name="box" type="box" size="{8} {9} {10}" pos="4 0 -1" euler="0 0 30"/>
+    <body pos="0 0 .6"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+    <body pos="1 0 .6"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+    <body pos="2 0 .6"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+    <body pos="3 0 .6"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+    <body pos="4 0 .6"><freejoint/><geom type="box" size=".1 .1 .1"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_geoms_that_grow_are_as_if_compiled_so():
+    """Grown through the floor, so that whoever falls lands on them; their bounds must grow too."""
+    small = SHAPES.format(*[0.05] * 11)
+    sizes = [1.25, 0.3, 1.2, 0.5, 1.3, 0.4, 0.6, 1.3, 0.4, 0.6, 1.35]
+    grown = mujoco.MjModel.from_xml_string(SHAPES.format(*sizes))
+    made = physics.make("native", small, 2)
+    fields = {"geom_size": np.stack([made.model.geom_size, grown.geom_size])}
+    rolled = made.rollout(np.zeros((2, 250, 0)), fields=fields)
+    for i, model in enumerate((mujoco.MjModel.from_xml_string(small), grown)):
+        data = mujoco.MjData(model)
+        for k in range(250):
+            mujoco.mj_step(model, data)
+            np.testing.assert_array_equal(rolled.qpos[i, k], data.qpos)
+    np.testing.assert_array_less(rolled.qpos[0, -1, 2::7] + 0.05, rolled.qpos[1, -1, 2::7])
 
 
 def test_chunks_change_nothing(native, monkeypatch):
