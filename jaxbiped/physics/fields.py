@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import mujoco
 import numpy as np
 from jaxtyping import Float64, Integer
 from mujoco.batch import Batch, SimulationError
@@ -27,8 +26,6 @@ class Fields:
         """
         if not values or not len(ids):
             return
-        if "geom_size" in values:
-            values = {**bounds(self.batch.model, values["geom_size"]), **values}
         self.written |= values.keys()
         for name, value in values.items():
             self.batch.expand(name)[ids] = value[ids]
@@ -52,25 +49,3 @@ class Fields:
         """The values of a field, [B, ...], derived ones too."""
         rows = self.batch.expanded(name)
         return self.own(name) if rows is None else rows
-
-
-def bounds(model: mujoco.MjModel, size: Float64[np.ndarray, "B ngeom 3"]) -> dict[str, Float64[np.ndarray, "B ..."]]:
-    """Bounding spheres and boxes of geoms of these sizes, which MuJoCo derives only when it compiles a model.
-
-    A box that grew would have no contact outside its old bounds. Planes, meshes and height fields keep their own.
-    """
-    radius = np.tile(model.geom_rbound, (len(size), 1))
-    box = np.tile(model.geom_aabb, (len(size), 1, 1))
-    a, b, _ = np.moveaxis(size, -1, 0)
-    geom = mujoco.mjtGeom
-    for kind, reach, half in (
-        (geom.mjGEOM_SPHERE, a, (a, a, a)),
-        (geom.mjGEOM_CAPSULE, a + b, (a, a, a + b)),
-        (geom.mjGEOM_CYLINDER, np.hypot(a, b), (a, a, b)),
-        (geom.mjGEOM_ELLIPSOID, size.max(axis=-1), size),
-        (geom.mjGEOM_BOX, np.linalg.norm(size, axis=-1), size),
-    ):
-        at = model.geom_type == int(kind)
-        radius[:, at] = reach[:, at]
-        box[:, at, 3:] = (half if isinstance(half, np.ndarray) else np.stack(half, axis=-1))[:, at]
-    return {"geom_rbound": radius, "geom_aabb": box}

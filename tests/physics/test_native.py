@@ -59,7 +59,7 @@ SHAPES = """
 
 
 def test_geoms_that_grow_are_as_if_compiled_so():
-    """Grown through the floor, so that whoever falls lands on them; their bounds must grow too."""
+    """Grown through the floor, so that whoever falls lands on them: bounds and hierarchies must follow."""
     small = SHAPES.format(*[0.05] * 11)
     sizes = [1.25, 0.3, 1.2, 0.5, 1.3, 0.4, 0.6, 1.3, 0.4, 0.6, 1.35]
     grown = mujoco.MjModel.from_xml_string(SHAPES.format(*sizes))
