@@ -57,6 +57,8 @@ class StanceConfig(Model):
     squatting: Length = 0.155
     inward: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.012
     """How far inside a foot's middle it bears the whole weight: less sway, and less margin to the foot's inner edge."""
+    inward_climbing: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.004
+    """The same while stepping over a rise, where the height may be other than expected."""
 
 
 class MassesConfig(Model):
@@ -95,7 +97,7 @@ class RangesConfig(Model):
     """Joint ranges [deg] of the left leg; yaw and roll of the right leg are mirrored."""
 
     hip_yaw: Degrees = (-40.0, 40.0)
-    hip_roll: Degrees = (-40.0, 40.0)
+    hip_roll: Degrees = (-45.0, 45.0)
     hip_pitch: Degrees = (-110.0, 40.0)
     knee_pitch: Degrees = (0.0, 135.0)
     ankle_pitch: Degrees = (-90.0, 45.0)
@@ -144,8 +146,8 @@ class RobotModelConfig(Model):
             )
         if body.camera_top < body.torso_top:
             raise ValueError("proportions: camera_top must be at least torso_top")
-        if stance.inward >= body.foot_width / 2:
-            raise ValueError("stance: inward must be less than half of foot_width")
+        if max(stance.inward, stance.inward_climbing) >= body.foot_width / 2:
+            raise ValueError("stance: inward and inward_climbing must be less than half of foot_width")
         if body.foot_width > 2 * body.hip_offset:
             raise ValueError("proportions: the feet overlap: foot_width must be at most twice hip_offset")
         return self

@@ -22,7 +22,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.motion.biped import JOINT_NAMES, Biped, RobotModelConfig
 from jaxbiped.motion.posture import link_masses, posture
 from jaxbiped.motion.request import Request
-from jaxbiped.motion.score import Score, channels, compose, hip_height, schedule
+from jaxbiped.motion.score import Score, channels, compose, hip_height, ramp, schedule
 from jaxbiped.motion.zmp import com_from_zmp, zmp_of_masses
 
 KNOTS = 1024  # samples of a movement, whatever its duration: every primitive runs through one compiled function
@@ -96,12 +96,23 @@ def perform(score: Score, biped: Biped, com_height: Float[Array, ""]) -> Motion:
         real = zmp_of_masses(pose(biped, com, hip, feet, load, pressure).links, masses, ground, dt)
         return wanted + (reference - real), None
 
+    # The pendulum looks a little beyond its rests; the seam is made exact below.
     wanted, _ = jax.lax.scan(correct, reference, None, length=FILTER_ROUNDS)
-    com = com_from_zmp(wanted, com_height, dt)
+    com = settle(com_from_zmp(wanted, com_height, dt), reference[0], reference[-1], score, time)
     held = pose(biped, com, hip, feet, load, pressure)
     zmp = zmp_of_masses(held.links, masses, ground, dt)
     margin = support_margin(biped, feet, swing, zmp)
     return Motion(time, held.q, held.torque, com, zmp, margin, feet, held.pelvis, held.slack)
+
+
+def settle(
+    com: Float[Array, "N 2"], start: Float[Array, "2"], end: Float[Array, "2"], score: Score, time: Float[Array, "N"]
+) -> Float[Array, "N 2"]:
+    """Fade the centre of mass from and into exact rest over the first and the last phase, on both feet."""
+    last = score.durations[jnp.sum(score.durations > 0) - 1]
+    from_start, to_end = ramp(time / score.durations[0])[:, None], ramp((time[-1] - time) / last)[:, None]
+    com = start + from_start * (com - start)
+    return end + to_end * (com - end)
 
 
 def support_margin(
@@ -139,7 +150,7 @@ def generate(request: Request, robot: RobotModelConfig, durations: np.ndarray | 
         durations = schedule(song, request.duration)
     if np.min(durations) <= 0.0:
         raise InputError(
-            "is too short for rests at both ends", field=f"{request.name}: duration", value=request.duration
+            "too short: no time is left for steps", field=f"{request.name}: duration", value=request.duration
         )
     biped = robot.traced()
     motion = perform(song.score(durations), biped, pendulum_height(request, robot))

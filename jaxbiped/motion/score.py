@@ -82,6 +82,7 @@ def compose(request: Request, robot: RobotModelConfig) -> Composer:
     upright = {False: stance.standing, True: stance.squatting}
     begin, end = upright[request.squat_start], upright[request.squat_end]
     low = min(0.0, request.rise)
+    inward = stance.inward_climbing if request.rise else stance.inward
     lean = math.copysign(request.lean, request.rise)
     walk = hip_height(request, robot)
     pairs = request.pairs
@@ -104,7 +105,7 @@ def compose(request: Request, robot: RobotModelConfig) -> Composer:
             sign = 1.0 if side == "left" else -1.0
             other = "right" if side == "left" else "left"
             song.phase(f"shift to {other}", 1.0)
-            px, py = _pressure(song.now, other, lean if song.now[f"{other}_z"] > low + 1e-6 else 0.0, stance.inward)
+            px, py = _pressure(song.now, other, lean if song.now[f"{other}_z"] > low + 1e-6 else 0.0, inward)
             song.to(zmp_x=px, zmp_y=py, load=1.0 if other == "left" else 0.0)
             song.phase(f"swing {side}", 1.1, (int(side == "left"), int(side == "right")))
             there = {
@@ -124,7 +125,7 @@ def compose(request: Request, robot: RobotModelConfig) -> Composer:
 
 
 def hip_height(request: Request, robot: RobotModelConfig) -> float:
-    """Height [m] of the hips above the lower ground while walking: the stance's, or as low as the stride needs.
+    """Height [m] of the hips above the lower ground while walking: the stance's, or as low as the stride needs, but no squat.
 
     When all weight is on one foot, the other leg is stretched by the stride and by the sway of the pelvis, which leads
     the centre of mass because the other leg lags behind.
@@ -135,9 +136,11 @@ def hip_height(request: Request, robot: RobotModelConfig) -> float:
     moving = masses.torso + 1.5 * masses.thigh + 0.5 * masses.shank  # what of both legs goes with the pelvis
     lead = 1.0 + (masses.foot + 0.75 * masses.shank + 0.25 * masses.thigh) / moving
     ahead = lead * (abs(request.forward) / pairs + max(0.0, request.lean))
-    aside = masses.total / moving * (body.hip_offset - stance.inward) + lead * abs(request.left) / pairs
+    inward = stance.inward_climbing if request.rise else stance.inward
+    aside = masses.total / moving * (body.hip_offset - inward) + lead * abs(request.left) / pairs
     left_over = (body.thigh + body.shank - SLACK) ** 2 - ahead**2 - aside**2
-    return min(height, body.ankle_height + math.sqrt(max(0.0, left_over)))
+    needed = body.ankle_height + math.sqrt(max(0.0, left_over))
+    return max(min(height, needed), stance.squatting)
 
 
 def schedule(song: Composer, duration: float) -> np.ndarray:
@@ -165,6 +168,12 @@ def _pressure(now: dict[str, float], side: str, ahead: float, inward: float) -> 
     return now[f"{side}_x"] + ahead * cos - left * sin, now[f"{side}_y"] + ahead * sin + left * cos
 
 
+def ramp(part: Float[Array, "*N"]) -> Float[Array, "*N"]:
+    """From 0 to 1 with least jerk, at rest at and beyond both ends."""
+    s = jnp.clip(part, 0.0, 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+
 def channels(score: Score, time: Float[Array, "N"]) -> tuple[Float[Array, "N C"], Float[Array, "N 2"]]:
     """The channels at given times [s], and which feet swing."""
     ends = jnp.cumsum(score.durations)
@@ -172,10 +181,9 @@ def channels(score: Score, time: Float[Array, "N"]) -> tuple[Float[Array, "N C"]
     index = score.phase.astype(jnp.int32)
     begin = starts[index] + score.window[:, 0] * score.durations[index]
     length = (score.window[:, 1] - score.window[:, 0]) * score.durations[index]
-    s = jnp.clip((time[:, None] - begin) / jnp.maximum(length, 1e-6), 0.0, 1.0)
-    ramp = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    risen = ramp((time[:, None] - begin) / jnp.maximum(length, 1e-6))
     inside = (time[:, None] >= starts) & (time[:, None] < ends)
-    return score.start + jnp.matmul(ramp, score.delta, precision="highest"), inside.astype(jnp.float32) @ score.swing
+    return score.start + jnp.matmul(risen, score.delta, precision="highest"), inside.astype(jnp.float32) @ score.swing
 
 
 def with_durations(score: Score, durations: Float[Array, "P"]) -> Score:

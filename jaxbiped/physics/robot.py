@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -76,15 +76,6 @@ def add_terrain(spec: mujoco.MjSpec, boxes: int = 0) -> mujoco.MjSpec:
     return spec
 
 
-@dataclass(frozen=True)
-class BoxFields:
-    """Values of the model's fields that lay the box slots out; rows are the slots."""
-
-    geom_pos: np.ndarray  # [M, 3] [m]
-    geom_size: np.ndarray  # [M, 3] [m] half sizes
-    geom_quat: np.ndarray  # [M, 4]
-
-
 def box_slots(model: mujoco.MjModel) -> np.ndarray:
     """Geom ids of the box slots, in order."""
     names = [model.geom(g).name for g in range(model.ngeom)]
@@ -126,7 +117,7 @@ def _inertia(body, mass: float, height: float, size: tuple[float, float, float])
     body.explicitinertial = True
 
 
-def _skin(body, half: tuple[float, float, float], pos: tuple[float, float, float], rgba) -> None:
+def _skin(body, half: Sequence[float | int], pos: Sequence[float | int], rgba) -> None:
     """A box to be seen, which touches nothing."""
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half, pos=pos, rgba=rgba, contype=0, conaffinity=0, mass=0)
 

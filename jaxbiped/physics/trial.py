@@ -45,7 +45,7 @@ class Tolerance(Model):
 
     placement: float = 0.010
     """[m] of the middle between the feet."""
-    yaw: float = math.radians(5.0)
+    yaw: float = math.radians(10.0)
     """[rad]"""
     height: float = 0.005
     """[m] of each sole above or below the ground that it should stand on."""
@@ -94,7 +94,7 @@ def nominal_edge(request: Request, robot: RobotModelConfig) -> float:
 
 
 def lay_out(model: mujoco.MjModel, table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance) -> float:
-    """Write a primitive's terrain and a disturbance into a freshly compiled model; returns the ground [m] at the start."""
+    """Write a primitive's terrain and a disturbance into a freshly compiled model; returns the start's ground [m]."""
     request, start = table.request, 0.0
     for part in ("foot_left", "foot_right"):
         model.geom_friction[part_geoms(model, part), 0] = d.friction
