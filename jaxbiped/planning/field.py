@@ -110,16 +110,27 @@ def _on_all_cores(solve, inputs, method: str) -> CostToGo:
     if traced or batch <= most or jax.default_backend() != "cpu":
         return solve(jax.tree.map(jnp.asarray, inputs), method)
     inputs = jax.tree.map(np.asarray, inputs)
+    out = CostToGo(
+        _aligned(inputs[0].shape[:1] + inputs[0].shape[-2:]), np.empty(batch, np.int32), np.empty(batch, bool)
+    )
 
     def piece(start):
         stop = min(start + most, batch)
-        short = jax.tree.map(lambda a: a[max(stop - most, 0) : stop], inputs)  # the last one overlaps: one program
-        out = jax.block_until_ready(solve(short, method))
-        return jax.tree.map(lambda a: np.asarray(a)[start - stop :], out)
+        part = jax.tree.map(lambda a: a[max(stop - most, 0) : stop], inputs)  # the last one overlaps: one program
+        found = solve(part, method)
+        jax.tree.map(lambda whole, a: np.copyto(whole[start:stop], np.asarray(a)[start - stop :]), out, found)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        parts = list(pool.map(piece, range(0, batch, most)))
-    return jax.tree.map(lambda *pieces: jnp.asarray(np.concatenate(pieces)), *parts)
+        list(pool.map(piece, range(0, batch, most)))
+    return jax.tree.map(jnp.asarray, out)
+
+
+def _aligned(shape) -> Float[np.ndarray, "..."]:
+    """Room for float32 that JAX takes over as it is instead of copying it."""
+    size = 4 * int(np.prod(shape))
+    room = np.empty(size + 64, np.uint8)
+    start = -room.ctypes.data % 64
+    return room[start : start + size].view(np.float32).reshape(shape)
 
 
 def _is_large(grids) -> bool:
@@ -131,11 +142,11 @@ def _solve(edges, goal_ij, method, valid) -> CostToGo:
     # large maze is off by more than 1e-5, so the kernels alone are then float64, in any program.
     large = _is_large(edges[0][1:-1, 1:-1, 0])
     with jax.enable_x64(large):
-        dtype = jnp.float64 if large else jnp.float32
+        state = kernels.beginning(edges, goal_ij, jnp.float64 if large else jnp.float32)
         if large and method == "line_sweep" and goal_ij.shape[0] == 1:
-            cost, steps, converged = worklist.settle(edges, goal_ij, dtype)
+            cost, steps, converged = worklist.settle(edges, state)
         else:
-            cost, steps, converged = kernels.settle(method, edges, goal_ij, dtype)
+            cost, steps, converged = kernels.settle(method, edges, state)
         cost, steps = jnp.moveaxis(cost[1:-1, 1:-1].astype(jnp.float32), -1, 0), steps.astype(jnp.int32)
     converged &= valid
     return CostToGo(jnp.where(converged[:, None, None], cost, jnp.inf), steps, converged)

@@ -135,29 +135,33 @@ def default_method() -> str:
     return "line_sweep" if jax.default_backend() == "cpu" else "wavefront"
 
 
-def settle(method, edges, goal_ij, dtype, most=None):
+def beginning(edges, goal_ij, dtype):
+    """State before the first step, costs to be summed as `dtype`: (cost, rows), 0 at each goal inside the grid."""
+    height, width, _ = edges[0].shape
+    rows, columns = (lax.broadcasted_iota(jnp.int32, (height, width, 1), a) for a in (0, 1))
+    inside = (goal_ij >= 0).all(-1) & (goal_ij[:, 0] < height - 2) & (goal_ij[:, 1] < width - 2)
+    goal = inside & (rows == goal_ij[:, 0] + 1) & (columns == goal_ij[:, 1] + 1)
+    return jnp.where(goal, 0.0, jnp.inf).astype(dtype), goal.any((1, 2)).astype(jnp.float32)
+
+
+def settle(method, edges, state, most=None):
     """Relax until nothing changes: (cost [H + 2, W + 2, B], steps until nothing changed [B], converged [B]).
 
-    Costs are summed as `dtype`. Every step settles one more cell of each least path at least, and every pass of
-    line sweeps a row's worth and more, so that H * W steps always do: that is the bound, unless `most` is less.
+    Every step settles one more cell of each least path at least, and every pass of line sweeps a row's worth
+    and more, so that H * W steps always do: that is the bound, unless `most` is less.
     """
     height, width, batch = edges[0].shape
     relax = METHODS[method]
-    rows, columns = (lax.broadcasted_iota(jnp.int32, (height, width, 1), a) for a in (0, 1))
-    inside = (goal_ij >= 0).all(-1) & (goal_ij[:, 0] < height - 2) & (goal_ij[:, 1] < width - 2)
-    start = inside & (rows == goal_ij[:, 0] + 1) & (columns == goal_ij[:, 1] + 1)
-    goal_rows = start.any((1, 2)).astype(jnp.float32)
-    start = jnp.where(start, 0.0, jnp.inf).astype(dtype), goal_rows
 
     def again(state):
         _, changed, _, step = state
         return (jnp.any(changed) & (step < (most or height * width))) | (step < 2)
 
     def body(state):
-        cost, _, steps, step = state
-        cost, changed = relax(edges, cost, step)
-        return cost, changed, jnp.where(changed, step + 1, steps), step + 1
+        state, _, steps, step = state
+        state, changed = relax(edges, state, step)
+        return state, changed, jnp.where(changed, step + 1, steps), step + 1
 
-    state = start, jnp.ones((batch,), bool), jnp.zeros((batch,), jnp.int32), jnp.int32(0)
+    state = state, jnp.ones((batch,), bool), jnp.zeros((batch,), jnp.int32), jnp.int32(0)
     (cost, _), changed, steps, _ = lax.while_loop(again, body, state)
     return cost, steps, ~changed

@@ -15,19 +15,31 @@ from jaxbiped.planning import kernels
 from jaxbiped.planning.kernels import DI, DJ, put, take, wavefront
 
 SWEEPS = 4  # passes before the list takes over: open ground needs no more, and on other ground the list is faster
+LOOKS = 1  # at each cell, on average, before sweeps take over again: costs thrown at random mislead the list
 WAITS = 256
-ROUNDS = 64  # looks at each cell, on average, before giving up; costs of 1 to 100 thrown at random need about 3
 
 
-def settle(edges, goal_ij, dtype):
+def settle(edges, state):
     """As `kernels.settle` with line sweeps, for a batch of one; steps are those of the sweeps."""
-    cost, steps, converged = kernels.settle("line_sweep", edges, goal_ij, dtype, SWEEPS)
-    cost, converged = lax.cond(converged[0], lambda _, cost: (cost, jnp.array([True])), finish, edges, cost)
+    cells = state[0].size
+
+    def again(state):
+        _, _, steps, converged = state
+        return ~converged[0] & (steps[0] < cells)
+
+    def body(state):
+        cost, rows, steps, _ = state
+        cost, more, converged = kernels.settle("line_sweep", edges, (cost, rows), SWEEPS)
+        cost, converged = lax.cond(converged[0], lambda _, cost: (cost, jnp.array([True])), relax, edges, cost)
+        return cost, jnp.ones_like(rows), steps + more, converged
+
+    state = *state, jnp.zeros(1, jnp.int32), jnp.array([False])
+    cost, _, steps, converged = lax.while_loop(again, body, state)
     return cost, steps, converged
 
 
-def finish(edges, cost):
-    """Settle what sweeps have left, in order of a list: (cost [H + 2, W + 2, 1], converged [1]).
+def relax(edges, cost):
+    """Follow a list through what sweeps have left: (cost [H + 2, W + 2, 1], nothing left [1]).
 
     `edges` and `cost` as in `kernels`, for a batch of one.
     """
@@ -100,7 +112,7 @@ def finish(edges, cost):
         return cost, queue, word, wrap(head + 1), size - 1, pops + 1
 
     def unfinished(state):
-        return (state[4] > 0) & (state[5] < ROUNDS * count)
+        return (state[4] > 0) & (state[5] < LOOKS * count)
 
     cost, _, _, _, size, _ = lax.while_loop(unfinished, pop, (cost, queue, word, zero, size, zero))
     return cost.reshape(shape), (size == 0)[None]
