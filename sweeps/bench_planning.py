@@ -14,8 +14,8 @@ several times overbooked at the time (load 5 to 9), so that only ratios mean any
 ours. 4,096 maps of 28 x 36: 4.3x pyastar2d, 20x Dijkstra, 55x Dijkstra and its graph; ours takes 9 us of one core
 a map. 512 maps of 140 x 180: 0.9x, 5.4x and 13x. One map of 512 x 512, by processor time: open 3.8x, rooms 1.2x,
 maze 0.24 to 0.37x, maze with loops 0.55x. Slow: cells thrown at random, 0.14x.
-Short of its target: pyastar2d on 28 x 36 (5x), on the edge the maze (a third), and pyastar2d on 140 x 180 (2x): there a chunk
-no longer fits the cache.
+Short of its target: pyastar2d on 28 x 36 (5x); on the edge: the maze (a third); far short: pyastar2d on 140 x 180
+(2x), where a chunk no longer fits the cache.
 """
 
 from __future__ import annotations

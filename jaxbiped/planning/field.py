@@ -155,6 +155,9 @@ def _solve(edges, goal_ij, method, valid) -> CostToGo:
 def _by_chunks(solve, inputs, large):
     """`solve(*inputs)` in chunks of the leading axis, one after the other, each stopping by itself."""
     batch = inputs[0].shape[0]
+    if batch == 0:
+        grid = inputs[0].shape[-2:]
+        return CostToGo(jnp.zeros((0, *grid)), jnp.zeros(0, jnp.int32), jnp.zeros(0, bool))
     least, most = LANES_LARGE if large else LANES
     if batch < FEW:
         chunks, size = (batch, 1) if large else (1, batch)

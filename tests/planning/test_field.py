@@ -123,6 +123,12 @@ def test_nasty_grids():
     np.testing.assert_allclose(row.cost[0, 0], 2.0 * np.arange(8, -1, -1))
 
 
+def test_no_arenas():
+    none = np.zeros((0, 4, 5), np.int8)
+    out = planning.field(none, none, goal_ij=np.zeros((0, 2), int))
+    assert out.cost.shape == (0, 4, 5) and out.converged.shape == (0,)
+
+
 def test_unknown_method():
     free = np.ones((1, 2, 2), np.int8)
     with pytest.raises(InputError, match="line_sweep"):
