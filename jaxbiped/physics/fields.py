@@ -24,11 +24,14 @@ class Fields:
 
         Without the latter a box that was moved keeps its old bounding volume, and silently has no contact.
         """
-        if not values or not len(ids):
-            return
         self.written |= values.keys()
+        rows = {name: self.batch.expand(name) for name in values}
+        differ = [np.any((rows[name] != value).reshape(len(value), -1), axis=1) for name, value in values.items()]
+        ids = ids[np.any(differ, axis=0)[ids]] if differ else ids[:0]
+        if not len(ids):
+            return
         for name, value in values.items():
-            self.batch.expand(name)[ids] = value[ids]
+            rows[name][ids] = value[ids]
         try:
             self.batch.set_const(ids.astype(np.int32))
         except SimulationError as error:
