@@ -1,6 +1,5 @@
 """The closed loop: sense, localise, map, plan, select, execute, until each mission has ended."""
 
-from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import decide
 from jaxbiped.mission.executors import EXECUTORS, Execution, Executor, kinematic
 from jaxbiped.mission.log import MissionLog
@@ -30,7 +29,6 @@ __all__ = [
     "Strategy",
     "World",
     "compile_queue",
-    "cycle",
     "decide",
     "kinematic",
     "oracle_plan",
