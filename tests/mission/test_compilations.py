@@ -9,7 +9,7 @@ import pytest
 
 from jaxbiped import planning
 from jaxbiped.mission.oracle import oracle_plan
-from jaxbiped.mission.queue import stack
+from jaxbiped.mission.queue import SLOTS, stack
 from tests.mission.conftest import PROGRAM, SETTINGS, pad, play
 
 EVENTS = []
@@ -79,3 +79,19 @@ def test_oracle_plan_and_field_compile_once(population, warm):
     second = both(1)
     assert traced_or_compiled()[before:] == []
     assert not np.allclose(first[0], second[0]) and not np.allclose(first[1], second[1])
+
+
+@pytest.mark.parametrize("batch", [SLOTS, 33])
+def test_planning_of_a_full_set_of_slots_compiles_inside_a_program(batch):
+    """As in the compiled loop, whose own compilation at this size is left to the benchmark."""
+    rules = planning.Rules(*jnp.ones((3, batch), bool))
+
+    @jax.jit
+    def plan(classes, levels, costs, goal_ij, ij):
+        cost = planning.field(classes, levels, costs, rules, goal_ij).cost
+        return planning.next_step(cost, classes, levels, costs, rules, ij, jnp.zeros(batch, jnp.int32))
+
+    classes = jnp.ones((batch, *PROGRAM.spec.shape), jnp.int8)
+    costs = planning.Costs(*jnp.ones((5, batch)))
+    far = jnp.full((batch, 2), 20, jnp.int32)
+    assert plan(classes, classes * 0, costs, far, far * 0)[:, 0].tolist() == [1] * batch

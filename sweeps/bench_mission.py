@@ -1,0 +1,256 @@
+"""Speed of the closed loop: missions a second against the same loop in plain NumPy and heapq, one arena at a time.
+
+    python sweeps/bench_mission.py            # ratio to the reference, and microseconds of each part
+    python sweeps/bench_mission.py --stream   # peak memory while arenas stream through: it must not grow
+    python sweeps/bench_mission.py --sweep    # compilations of a sweep over 64 cost vectors: none after the first
+
+Both sides use the whole machine, with two threads and two processes, on the same arenas and strategies; compile time
+is apart. The compiled side works the list of missions off several times over, as a study has many.
+
+Measured on two cores of an AMD EPYC (2 MiB of L2, 32 MiB of L3) that other programs kept busy too, jax 0.10.2:
+  compiled 211, 136 and 110 missions/s against 4.0, 2.2 and 2.4 of the reference (23 decisions a mission): ratios of
+  52 to 65, 62 and 39 to 49 in rounds of three runs, 42 by CPU seconds. The same code and number of decisions in all
+  of 150 missions. About 22 s of compiling on a core that is free.
+  A decision: sense 51 us, map 97, plan 12, select 7, execute 6; all 200. The reference: 4.0 ms, 3.2, 1.8 and 0.6.
+  --stream: 1,024 arenas in shards of 512 peak at 1.71 GiB, 4,096 at 1.73 GiB.
+  --sweep: 20 traces and 19 compilations for the first cost vector, none for the 64 that follow.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import os
+import resource
+import sys
+import time
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped import planning
+from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.mission import decision
+from jaxbiped.mission.cycle import conclude, cycle, sense
+from jaxbiped.mission.executors import kinematic
+from jaxbiped.mission.queue import SLOTS, stack
+from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.state import start
+from jaxbiped.mission.strategies import STRATEGIES
+from jaxbiped.study.evaluate import WORKERS, CompileClock, StudyConfig, draw, evaluate, run_all
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.reference import mission as reference
+
+CONFIG = MissionConfig()
+PROGRAM = program(CONFIG, (SIZE_X, SIZE_Y))
+MISSIONS = 2400  # that the compiled side is timed on, at least
+
+
+def points():
+    """All strategies' settings, [P]."""
+    return stack([CONFIG.settings(name) for name in STRATEGIES])
+
+
+def row(tree, index):
+    """Row `index` of every leaf."""
+    return jax.tree.map(lambda leaf: leaf[index], tree)
+
+
+def compiled_side(arenas: int):
+    """A function that works off the list of missions, several times over: results [P, arenas * copies]."""
+    copies = -(-MISSIONS // (arenas * len(STRATEGIES)))
+    batch, seeds = draw(jax.random.key(0), jnp.tile(jnp.arange(arenas), copies), FAMILIES)
+    settings = points()
+    return lambda: run_all(batch, seeds, settings, len(seeds), PROGRAM, lambda ended: None)
+
+
+def play_one(arena, setting, seed):
+    """One mission of the reference: code, decisions, CPU seconds."""
+    begin = time.process_time()
+    mission = reference.run(arena, setting, seed, PROGRAM)
+    return mission.code, mission.decisions, time.process_time() - begin
+
+
+def missions_of(arenas: int):
+    """The list of missions: arena, settings, seed; strategy by strategy."""
+    batch, seeds = jax.device_get(draw(jax.random.key(0), jnp.arange(arenas), FAMILIES))
+    settings = points()
+    return [(row(batch, k), row(settings, p), seeds[k]) for p in range(len(STRATEGIES)) for k in range(arenas)]
+
+
+def pool_of_references():
+    """A process a core, of one thread each: more would get in each other's way."""
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
+    return multiprocessing.get_context("spawn").Pool(WORKERS)
+
+
+def timed(function, *arguments, **options):
+    """(result, seconds)."""
+    begin = time.perf_counter()
+    return function(*arguments, **options), time.perf_counter() - begin
+
+
+def parts(repeats: int = 20):
+    """Print microseconds a decision of each part, on one full set of slots in the middle of its missions."""
+    batch, seeds = draw(jax.random.key(0), jnp.arange(SLOTS), FAMILIES)
+    setting = jax.tree.map(lambda leaf: jnp.asarray(leaf)[jnp.arange(SLOTS) % len(STRATEGIES)], points())
+    world, mind = jax.vmap(partial(start, spec=PROGRAM.spec))(batch, setting, seeds)
+    turn = jax.jit(partial(cycle, program=PROGRAM))
+    for _ in range(6):
+        world, mind, *_ = turn(world, mind, batch, setting)
+    spec, blind = PROGRAM.spec, setting.strategy.blind
+    costs, rules = setting.costs.at_pitch(spec.pitch), setting.strategy.rules()
+
+    def plan(classes, levels, ij, goal_ij, yaw):
+        cost = planning.field(classes, levels, costs, rules, goal_ij).cost
+        heading = jax.vmap(decision.nearest_direction)(yaw)
+        return planning.next_step(cost, classes, levels, costs, rules, ij, heading)
+
+    def choose(*arguments):
+        return jax.vmap(partial(decision.choose, spec=spec))(*arguments)
+
+    def execute(world, mind, command, verdict):
+        done = jax.vmap(kinematic)(batch, world, command, setting)
+        ended = jax.vmap(partial(conclude, program=PROGRAM))(world, mind, command, verdict, done, batch, setting)
+        return ended
+
+    def part(name, function, *arguments):
+        run = jax.jit(function)
+        result = jax.block_until_ready(run(*arguments))
+        taken = min(timed(lambda: jax.block_until_ready(run(*arguments)))[1] for _ in range(repeats))
+        print(f"  {name:8s} {taken / SLOTS * 1e6:7.1f} us a decision")
+        return result
+
+    print(f"parts, {SLOTS} missions at once, one after the other (XLA may use all cores here):")
+    view, sightings = part("sense", jax.vmap(partial(sense, program=PROGRAM)), world, mind, batch, setting)
+    perceive = jax.vmap(partial(decision.perceive, program=PROGRAM))
+    mind, classes, levels, ij, goal_ij = part("map", perceive, mind, view, sightings, batch, setting)
+    moves = part("plan", plan, classes, levels, ij, goal_ij, mind.belief.pose.yaw)
+    arguments = (mind, ij, goal_ij, moves, classes, levels, blind)
+    mind, command, verdict = part("select", choose, *arguments)
+    part("execute", execute, world, mind, command, verdict)
+    part("all", partial(cycle, program=PROGRAM), world, mind, batch, setting)
+
+
+def reference_parts(arenas: int = 6) -> None:
+    """Print the same of the reference, in this process, over whole missions."""
+    spent = {"sense": 0.0, "map": 0.0, "plan": 0.0, "all": 0.0}
+    places = (
+        ("sense", reference.sensing, "measure_raycast"),
+        ("sense", reference.sensing, "sight_landmarks"),
+        ("map", reference, "perceive"),
+        ("plan", reference, "plan"),
+        ("all", reference, "cycle"),
+    )
+
+    def metered(part, function):
+        def run(*arguments):
+            result, taken = timed(function, *arguments)
+            spent[part] += taken
+            return result
+
+        return run
+
+    for part, module, name in places:
+        setattr(module, name, metered(part, getattr(module, name)))
+    decisions = sum(play_one(*mission)[1] for mission in missions_of(arenas))
+    spent["select and execute"] = 2 * spent["all"] - sum(spent.values())
+    print("parts of the reference:")
+    for part, taken in spent.items():
+        print(f"  {part:8s} {taken / decisions * 1e6:7.0f} us a decision")
+
+
+def compare(arenas: int, repeats: int) -> None:
+    """Print the ratio and what it is made of. The sides take turns, and the fastest run of each counts."""
+    clock, run, tasks = CompileClock(), compiled_side(arenas), missions_of(arenas)
+    _, first = timed(run)
+    compiling, fast, slow, fast_cpu, slow_cpu = clock.seconds, [], [], [], []
+    with pool_of_references() as pool:
+        pool.starmap(play_one, tasks[: 4 * WORKERS], chunksize=1)  # imports are not counted
+        for _ in range(repeats):
+            begin = time.process_time()
+            result, taken = timed(run)
+            fast_cpu.append(result.code.size / (time.process_time() - begin))
+            fast.append(result.code.size / taken)
+            outcomes, taken = timed(pool.starmap, play_one, tasks, chunksize=1)
+            slow_cpu.append(len(tasks) / sum(cpu for *_, cpu in outcomes))
+            slow.append(len(tasks) / taken)
+    codes, turns, _ = np.array(outcomes).T
+    for name, rates in (("compiled", fast), ("reference", slow)):
+        print(f"{name:10s} {max(rates):7.2f} missions/s, {max(rates) * turns.mean():8.1f} decisions/s")
+    rounds = ", ".join(f"{f / s:.0f}" for f, s in zip(fast, slow, strict=True))
+    print(f"ratio: {max(fast) / max(slow):.0f}, by rounds {rounds}")
+    print(f"ratio by CPU seconds, which a busy machine disturbs less: {max(fast_cpu) / max(slow_cpu):.0f}")
+    print(f"apart: first run {first:.1f} s for {result.code.size} missions, of which {compiling:.1f} s of compiling")
+    same = codes == result.code[:, :arenas].ravel()
+    same &= turns == result.decisions[:, :arenas].ravel()
+    print(f"same code and number of decisions: {same.mean():.1%} of {len(tasks)} missions")
+
+
+def peak_memory(arenas: int, shard: int) -> float:
+    """Greatest resident memory [GiB] of this process after so many arenas have streamed through."""
+    config = StudyConfig(arenas=arenas, shard=shard, strategies=("full", "blind_stop"))
+    for _ in evaluate(config):
+        pass
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+
+
+def stream(shard: int, shards: tuple[int, ...]) -> None:
+    """Print peak memory for several numbers of arenas, each in a fresh process."""
+    for count in shards:
+        begin = time.perf_counter()
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            peak = pool.apply(peak_memory, (count * shard, shard))
+        taken = time.perf_counter() - begin
+        print(f"{count * shard:7d} arenas in shards of {shard}: peak {peak:.2f} GiB, {taken:.0f} s", flush=True)
+
+
+def sweep(vectors: int = 64, arenas: int = 8) -> None:
+    """Print how often JAX traced and compiled, before and during a sweep over cost vectors."""
+    events = []
+    jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: events.append(event))
+    batch, seeds = draw(jax.random.key(0), jnp.arange(arenas), FAMILIES)
+    rng, setting, seen = np.random.default_rng(0), CONFIG.settings("full"), set()
+
+    def counted():
+        return tuple(sum(kind in event for event in events) for kind in ("jaxpr_trace", "backend_compile"))
+
+    for k in range(vectors + 1):
+        costs = planning.Costs(*(jnp.float32(c) for c in rng.uniform(0.1, 30, 5)))
+        point = stack([replace(setting, costs=costs)])
+        result = run_all(batch, seeds, point, arenas, PROGRAM, lambda ended: None)
+        seen.add(float(result.time.sum()))
+        if k == 0:
+            warm = counted()
+            print(f"first cost vector: {warm[0]} traces, {warm[1]} compilations")
+    more = tuple(after - before for after, before in zip(counted(), warm, strict=True))
+    print(f"{vectors} further cost vectors: {more[0]} traces, {more[1]} compilations; {len(seen)} different outcomes")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--arenas", type=int, default=20, help="arenas, each under all strategies, on both sides")
+    parser.add_argument("--repeats", type=int, default=3, help="rounds; the fastest of each side counts")
+    parser.add_argument("--stream", action="store_true")
+    parser.add_argument("--shard", type=int, default=1024)
+    parser.add_argument("--shards", type=int, nargs="+", default=[2, 8])
+    parser.add_argument("--sweep", action="store_true")
+    options = parser.parse_args()
+    if options.stream:
+        stream(options.shard, tuple(options.shards))
+    elif options.sweep:
+        sweep()
+    else:
+        compare(options.arenas, options.repeats)
+        parts()
+        reference_parts()
+
+
+if __name__ == "__main__":
+    main()
