@@ -123,10 +123,9 @@ def check_options(args: PlanArgs) -> None:
             raise InputError(message, field=name, value=getattr(args, name))
 
 
-@jax.jit
 def solve(classes, levels, costs, rules, goal_ij):
-    """Edge costs and cost-to-go of one map."""
-    edges = edge_costs(classes[None], levels[None], costs, rules)
+    """Edge costs and cost-to-go of one map; not in one program, in which the planner is slower on large maps."""
+    edges = jax.jit(edge_costs)(classes[None], levels[None], costs, rules)
     return edges[0], field(classes[None], levels[None], costs, rules, goal_ij).cost
 
 

@@ -66,32 +66,36 @@ def field(
     return _on_all_cores(_field, (classes, levels, each, goal_ij), _method(method))
 
 
-@partial(jax.jit, static_argnums=1)
-def _cost_to_go(inputs, method: str) -> CostToGo:
+@partial(jax.jit, static_argnums=(1, 2))
+def _cost_to_go(inputs, method: str, alone: bool) -> CostToGo:
     def chunk(edges, goal):
         valid = (edges >= 0).all((1, 2, 3))  # False for NaN as well
         edges = jnp.where(valid[:, None, None, None], edges, jnp.inf)
         last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
-        return _solve(tuple(last), goal, method, valid)
+        return _solve(tuple(last), goal, method, valid, alone)
 
-    return _by_chunks(_whole(chunk, method), inputs, _is_large(inputs[0]))
+    return _by_chunks(_whole(chunk, method, alone), inputs, _is_large(inputs[0]))
 
 
-@partial(jax.jit, static_argnums=1)
-def _field(inputs, method: str) -> CostToGo:
+@partial(jax.jit, static_argnums=(1, 2))
+def _field(inputs, method: str, alone: bool) -> CostToGo:
     def chunk(classes, levels, each, goal):
         costs, rules = each
         last = (jnp.moveaxis(a, 0, -1) for a in (classes, levels))
         valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)
         costs = jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs)
-        return _solve(half_edges(*last, costs, rules), goal, method, valid)
+        return _solve(half_edges(*last, costs, rules), goal, method, valid, alone)
 
-    return _by_chunks(_whole(chunk, method), inputs, _is_large(inputs[0]))
+    return _by_chunks(_whole(chunk, method, alone), inputs, _is_large(inputs[0]))
 
 
-def _whole(chunk, method: str):
-    """All of a chunk's work as one function where the kernel is one: no core then waits for another."""
-    return kernels.one_function(chunk) if method == "line_sweep" else chunk
+def _whole(chunk, method: str, alone: bool):
+    """All of a chunk's work as one function where the kernel is one: no core then waits for another.
+
+    Only in a program of its own. Within a larger one, where XLA may fuse the function with what comes before it (and
+    then fails to compile), each sweep is a function by itself: see `_solve`.
+    """
+    return kernels.one_function(chunk) if method == "line_sweep" and alone else chunk
 
 
 def _method(name: str) -> str:
@@ -108,7 +112,7 @@ def _on_all_cores(solve, inputs, method: str) -> CostToGo:
     batch, most = inputs[0].shape[0], (LANES_LARGE if _is_large(inputs[0]) else LANES)[1]
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(inputs))
     if traced or batch <= most or jax.default_backend() != "cpu":
-        return solve(jax.tree.map(jnp.asarray, inputs), method)
+        return solve(jax.tree.map(jnp.asarray, inputs), method, not traced)
     inputs = jax.tree.map(np.asarray, inputs)
     out = CostToGo(
         _aligned(inputs[0].shape[:1] + inputs[0].shape[-2:]), np.empty(batch, np.int32), np.empty(batch, bool)
@@ -117,7 +121,7 @@ def _on_all_cores(solve, inputs, method: str) -> CostToGo:
     def piece(start):
         stop = min(start + most, batch)
         part = jax.tree.map(lambda a: a[max(stop - most, 0) : stop], inputs)  # the last one overlaps: one program
-        found = solve(part, method)
+        found = solve(part, method, True)
         jax.tree.map(lambda whole, a: np.copyto(whole[start:stop], np.asarray(a)[start - stop :]), out, found)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -137,7 +141,7 @@ def _is_large(grids) -> bool:
     return grids.shape[-2] * grids.shape[-1] > LARGE
 
 
-def _solve(edges, goal_ij, method, valid) -> CostToGo:
+def _solve(edges, goal_ij, method, valid, alone) -> CostToGo:
     # Sums along a path drift by up to half a unit in the last place a move: with float32 a path through a
     # large maze is off by more than 1e-5, so the kernels alone are then float64, in any program.
     large = _is_large(edges[0][1:-1, 1:-1, 0])
@@ -146,7 +150,9 @@ def _solve(edges, goal_ij, method, valid) -> CostToGo:
         if large and method == "line_sweep" and goal_ij.shape[0] == 1:
             cost, steps, converged = worklist.settle(edges, state)
         else:
-            cost, steps, converged = kernels.settle(method, edges, state)
+            relax = kernels.METHODS[method]
+            relax = kernels.one_function(relax) if method == "line_sweep" and not alone else relax
+            cost, steps, converged = kernels.settle(relax, edges, state)
         cost, steps = jnp.moveaxis(cost[1:-1, 1:-1].astype(jnp.float32), -1, 0), steps.astype(jnp.int32)
     converged &= valid
     return CostToGo(jnp.where(converged[:, None, None], cost, jnp.inf), steps, converged)

@@ -144,14 +144,13 @@ def beginning(edges, goal_ij, dtype):
     return jnp.where(goal, 0.0, jnp.inf).astype(dtype), goal.any((1, 2)).astype(jnp.float32)
 
 
-def settle(method, edges, state, most=None):
+def settle(relax, edges, state, most=None):
     """Relax until nothing changes: (cost [H + 2, W + 2, B], steps until nothing changed [B], converged [B]).
 
     Every step settles one more cell of each least path at least, and every pass of line sweeps a row's worth
     and more, so that H * W steps always do: that is the bound, unless `most` is less.
     """
     height, width, batch = edges[0].shape
-    relax = METHODS[method]
 
     def again(state):
         _, changed, _, step = state

@@ -29,7 +29,7 @@ def settle(edges, state):
 
     def body(state):
         cost, rows, steps, _ = state
-        cost, more, converged = kernels.settle("line_sweep", edges, (cost, rows), SWEEPS)
+        cost, more, converged = kernels.settle(kernels.line_sweep, edges, (cost, rows), SWEEPS)
         cost, converged = lax.cond(converged[0], lambda _, cost: (cost, jnp.array([True])), relax, edges, cost)
         return cost, jnp.ones_like(rows), steps + more, converged
 
