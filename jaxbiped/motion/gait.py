@@ -35,7 +35,7 @@ REACH_MARGIN = 0.001  # [m] that a leg keeps short of straight, where its kinema
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Motion:
-    """A movement at `KNOTS` equal steps of time."""
+    """A movement at equal steps of time, `KNOTS` of them by default."""
 
     time: Float[Array, "N"]  # [s]
     q: Float[Array, "N 12"]  # [rad]
@@ -70,19 +70,20 @@ class PrimitiveTable:
     peak_torque: float  # [Nm] of any joint, at rest
 
 
-@jax.jit
-def perform(score: Score, biped: Biped, com_height: Float[Array, ""]) -> Motion:
+@functools.partial(jax.jit, static_argnames="knots")
+def perform(score: Score, biped: Biped, com_height: Float[Array, ""], knots: int = KNOTS) -> Motion:
     """Play a score: everything of a movement but the checks. Compiled once; durations, lengths and robot are traced.
 
     Args:
       com_height: [m] of the pendulum.
+      knots: samples; static.
     """
     total = jnp.sum(score.durations)
-    dt = total / (KNOTS - 1)
-    time = jnp.arange(KNOTS) * dt
+    dt = total / (knots - 1)
+    time = jnp.arange(knots) * dt
     values, swing = channels(score, time)
     reference, load, hip = values[:, :2], values[:, 2], values[:, 3]
-    feet = values[:, 4:].reshape(KNOTS, 2, 4)
+    feet = values[:, 4:].reshape(knots, 2, 4)
     # Each foot bears its share as far off its middle as the zero moment point lies off the line between the feet.
     share = jnp.stack([load, 1.0 - load], axis=1)
     off = reference - jnp.sum(share[..., None] * feet[..., :2], axis=1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -105,7 +104,8 @@ def compose(request: Request, robot: RobotModelConfig) -> Composer:
             sign = 1.0 if side == "left" else -1.0
             other = "right" if side == "left" else "left"
             song.phase(f"shift to {other}", 1.0)
-            px, py = _pressure(song.now, other, lean if song.now[f"{other}_z"] > low + 1e-6 else 0.0, inward)
+            above = song.now[f"{other}_z"] > low + 1e-6
+            px, py = _pressure(song.now, other, lean if above else 0.0, inward)
             song.to(zmp_x=px, zmp_y=py, load=1.0 if other == "left" else 0.0)
             song.phase(f"swing {side}", 1.1, (int(side == "left"), int(side == "right")))
             there = {
@@ -125,7 +125,9 @@ def compose(request: Request, robot: RobotModelConfig) -> Composer:
 
 
 def hip_height(request: Request, robot: RobotModelConfig) -> float:
-    """Height [m] of the hips above the lower ground while walking: the stance's, or as low as the stride needs, but no squat.
+    """Height [m] of the hips above the lower ground while walking: the stance's, or as low as the stride needs.
+
+    Never lower than a squat.
 
     When all weight is on one foot, the other leg is stretched by the stride and by the sway of the pelvis, which leads
     the centre of mass because the other leg lags behind.
@@ -184,8 +186,3 @@ def channels(score: Score, time: Float[Array, "N"]) -> tuple[Float[Array, "N C"]
     risen = ramp((time[:, None] - begin) / jnp.maximum(length, 1e-6))
     inside = (time[:, None] >= starts) & (time[:, None] < ends)
     return score.start + jnp.matmul(risen, score.delta, precision="highest"), inside.astype(jnp.float32) @ score.swing
-
-
-def with_durations(score: Score, durations: Float[Array, "P"]) -> Score:
-    """The same movement in other time."""
-    return dataclasses.replace(score, durations=durations)

@@ -161,7 +161,7 @@ def test_ten_steps_in_a_row_do_not_creep():
     chain = dataclasses.replace(
         step, ctrl=np.tile(step.ctrl, (10, 1)), request=dataclasses.replace(step.request, forward=0.4)
     )
-    error = play(chain, ROBOT).error + [0.4 - 0.5, 0, 0]
+    error = play(chain, ROBOT).error + np.array([0.4 - 0.5, 0, 0])
     assert np.hypot(*error[:2]) < 2 * PLACE and abs(error[2]) < 2 * TURN
 
 
