@@ -23,6 +23,15 @@ with contextlib.redirect_stdout(io.StringIO()):  # it prints that MuJoCo Warp is
     from jaxbiped.physics.refusals import refusals
 
 SLOTS = "max_contact_points"
+EDGES = 6  # constraint rows a contact for which there is room in Warp: 4 of friction, and as many of joint limits
+STATE = (  # all that a step reads of the data before it
+    *("time", "qpos", "qvel", "act", "history", "qacc_warmstart", "plugin_state", "sensordata"),
+    *("ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata"),
+)
+WARP_FULL = {  # bits of what overflows in Warp; those of iterations are no overflow of ours
+    "constraint_full": ("NEFC", "NJMAX_NNZ", "NVMAX"),
+    "contact_full": ("BROADPHASE", "NARROWPHASE", "CCD", "HFIELD", "CONTACT_MATCH", "EPA_HORIZON", "TACTILE"),
+}
 
 
 def device_of(platform: str | None) -> jax.Device:
@@ -41,7 +50,7 @@ class Engine:
     a contact in it shows that a contact was, or would have been, dropped.
     """
 
-    def __init__(self, model: mujoco.MjModel, impl: str, device: str | None):
+    def __init__(self, model: mujoco.MjModel, batch_size: int, impl: str, device: str | None, contacts: int):
         if impl == "warp" and importlib.util.find_spec("warp") is None:
             raise InputError("needs the package warp-lang, which is not installed", field="impl", value=impl)
         self.device = device_of(device)
@@ -55,10 +64,14 @@ class Engine:
             model.numeric_data[slots] = limit + 1
         try:
             self.model = mjx.put_model(model, self.device, impl)
-            self.empty = mjx.make_data(model, device=self.device, impl=impl)
+            # Warp's contacts are in one buffer for all simulations, its constraints in one a simulation.
+            sizes = {"naconmax": contacts * batch_size, "njmax": EDGES * contacts} if impl == "warp" else {}
+            self.empty = mjx.make_data(model, device=self.device, impl=impl, **sizes)
         except (NotImplementedError, AssertionError, RuntimeError) as error:
             raise InputError(f"MJX cannot step this model: {error}", field="model") from None
         self.impl = impl
+        self.static = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
+        self.body_of_static = model.geom_bodyid[self.static]
         self.spare: tuple[int, ...] = ()  # contacts that must stay without contact
         if impl == "jax" and limit is not None:
             dims = np.asarray(self.empty._impl.contact.dim)
@@ -66,9 +79,19 @@ class Engine:
             self.spare = tuple(int(each[-1]) for each in last if len(each) > limit)
 
     def field(self, name: str) -> Any:
-        """A field of the model on the device, or None where MJX has none of this name."""
+        """A field of the model on the device, or None where MJX has none of this name that may differ."""
+        if self.impl == "warp" and name in ("body_pos", "body_quat"):  # bodies that stand still are placed only once
+            return None
         holder, key = (self.model.opt, name[4:]) if name.startswith("opt.") else (self.model, name)
         return getattr(holder, key, None)
+
+    def at(self, qpos: Float[Array, "nq"]) -> Any:
+        """The data of one simulation in a state."""
+        return self.empty.replace(qpos=qpos)
+
+    def initial(self) -> dict[str, Array]:
+        """What a step reads of the data of one simulation, at its beginning; the step makes all else anew."""
+        return {name: getattr(self.empty, name) for name in STATE if hasattr(self.empty, name)}
 
     def contact_count(self) -> int | None:
         """Contact slots of a simulation, each of which is paid for in every step; None where they are not fixed."""
@@ -76,7 +99,31 @@ class Engine:
 
     def step(self, model: Any, overrides: dict[str, Array], data: Any, control: Float[Array, "nu"]) -> Any:
         """One step of one simulation with its own fields."""
-        return mjx.step(model.tree_replace(overrides) if overrides else model, data.replace(ctrl=control))
+        data = data.replace(ctrl=control)
+        if not overrides:
+            return mjx.step(model, data)
+        model = model.tree_replace(overrides)
+        if self.impl == "warp" and len(self.static):
+            data = self.place_static(model, data)
+        return mjx.step(model, data)
+
+    def place_static(self, model: Any, data: Any) -> Any:
+        """Put static geoms where the model has them: Warp does so only when it makes its data."""
+        body, (w, x, y, z) = self.body_of_static, model.geom_quat[self.static].T
+        turned = jnp.stack(
+            [
+                jnp.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], axis=-1),
+                jnp.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)], axis=-1),
+                jnp.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], axis=-1),
+            ],
+            axis=-2,
+        )
+        frame = data.xmat[body]
+        place = data.xpos[body] + jnp.einsum("gij,gj->gi", frame, model.geom_pos[self.static])
+        return data.replace(
+            geom_xpos=data.geom_xpos.at[self.static].set(place),
+            geom_xmat=data.geom_xmat.at[self.static].set(frame @ turned),
+        )
 
     def flags(self, data: Any) -> Int[Array, "8"]:
         """What went wrong in the last step of one simulation, by the names of WARNINGS."""
@@ -84,4 +131,10 @@ class Engine:
         if self.spare:
             contact, spare = data._impl.contact, np.array(self.spare)
             wrong["contact_full"] = jnp.any(contact.dist[spare] < contact.includemargin[spare])
+        if self.impl == "warp":
+            from mujoco.mjx.third_party.mujoco_warp._src.types import OverflowType
+
+            for name, kinds in WARP_FULL.items():
+                bits = sum(int(OverflowType[kind]) for kind in kinds)
+                wrong[name] = jnp.any((data._impl.overflow & bits) != 0)
         return jnp.stack([jnp.asarray(wrong.get(name, False), jnp.int32) for name in WARNINGS])

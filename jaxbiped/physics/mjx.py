@@ -2,7 +2,9 @@
 
 One function steps a block of up to `block` steps, and is compiled once a (model, batch size): tables of any length, any
 `record_every` and `hold`, and living batches all run through it. It is compiled anew only when a field differs by
-simulation for the first time that the option `fields` had not named.
+simulation for the first time that the option `fields` had not named. JAX keeps what it compiled between processes in
+the folder that the environment variable JAX_COMPILATION_CACHE_DIR names: a second process then waits for the tracing
+only (3.9 s in place of 16.5 s, measured on a hopper).
 """
 
 from __future__ import annotations
@@ -40,6 +42,8 @@ class Options(Common):
     """Who steps: MJX's own JAX, or MuJoCo Warp where the package warp-lang is installed."""
     block: pydantic.PositiveInt = 32
     """Most steps in one call to the device. The results do not depend on it."""
+    contacts: pydantic.PositiveInt = 32
+    """With impl="warp", room for so many contacts a simulation, on average over the batch."""
 
 
 class Mjx:
@@ -53,7 +57,7 @@ class Mjx:
         self.watched = Watched.of(self.model, options.watch)
         self.watches = self.watched.names
         self.options = options
-        self.engine = Engine(self.model, options.impl, options.device)
+        self.engine = Engine(self.model, self.batch_size, options.impl, options.device, options.contacts)
         self.names: tuple[str, ...] = ()  # fields that differ by simulation in the compiled function
         self.add_names(options.fields)
         # The fields of the living batch, and of rollouts, which leave it as it is.
@@ -64,7 +68,7 @@ class Mjx:
         self.block = jax.jit(self.traced_block)
         self.start = jax.jit(self.traced_start)
         with jax.default_device(self.engine.device):
-            self.data = jax.tree.map(lambda x: jnp.tile(x, (self.batch_size, *[1] * x.ndim)), self.engine.empty)
+            self.data = jax.jit(jax.vmap(self.engine.at))(np.tile(self.model.qpos0, (self.batch_size, 1)))
             self.warned = self.unwarned()
         self.steps = np.zeros(self.batch_size, np.int64)  # since each reset
 
@@ -234,12 +238,13 @@ class Mjx:
 
     def traced_start(self, mask: Array, data: Any, qpos: Float[Array, "B nq"], qvel: Float[Array, "B nv"]) -> Any:
         """The data of a batch with the simulations of a mask at the beginning."""
-        fresh = jax.vmap(lambda q, v: self.engine.empty.replace(qpos=q, qvel=v))(qpos, qvel)
+        fresh = self.engine.initial() | {"qpos": qpos, "qvel": qvel}
 
-        def choose(new: Array, old: Array) -> Array:
-            return jnp.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+        def choose(name: str, value: Array) -> Array:
+            old = getattr(data, name)
+            return jnp.where(mask.reshape(-1, *[1] * (old.ndim - 1)), jnp.asarray(value, old.dtype), old)
 
-        return jax.tree.map(choose, fresh, data)
+        return data.replace(**{name: choose(name, value) for name, value in fresh.items()})
 
     def state(self, depth: Float[Array, "B W"]) -> State:
         """A copy of the living batch as it is."""

@@ -104,6 +104,7 @@ def test_one_that_blows_up_is_not_valid_and_harms_no_other(backend, when):
     _, qpos, qvel, fields = hops(backend.model, 60)
     backend.set_fields(fields)
     healed = backend.reset(np.arange(BATCH) == 2, qpos, qvel)
+    np.testing.assert_array_equal(healed.sensordata[2], 0)  # until the first step
     assert healed.valid.all() and not healed.warnings.any() and np.isfinite(healed.qpos).all()
     np.testing.assert_array_equal(backend.advance(controls[:, :30]).qpos[2], well.qpos[2, 29])
 

@@ -12,7 +12,7 @@ import pytest
 
 from jaxbiped import physics
 from jaxbiped.errors import InputError
-from tests.physics.models import PENDULUM
+from tests.physics.models import BATCH, HOPPER, PENDULUM, WATCH, hops
 
 BALLS = """
 <mujoco>
@@ -88,7 +88,7 @@ def test_warp_that_is_not_installed():
 def test_options_of_mjx():
     with pytest.raises(InputError, match="impl: Input should be 'jax' or 'warp'"):
         physics.make("mjx", PENDULUM, 1, impl="cpp")
-    with pytest.raises(InputError, match="threads: unknown option; there are block, device"):
+    with pytest.raises(InputError, match="threads: unknown option; there are block, contacts, device"):
         physics.make("mjx", PENDULUM, 1, threads=1)
 
 
@@ -136,3 +136,16 @@ def test_the_compilation_cache_works(tmp_path):
     (first, _), (second, _) = seconds(), seconds()
     assert any((tmp_path / "cache").iterdir())
     assert second < 0.5 * first
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(importlib.util.find_spec("warp") is None, reason="MuJoCo Warp is not installed")
+def test_warp_is_as_mujoco(native):
+    """Static geoms that differ by simulation too, which Warp itself places only once."""
+    controls, qpos, qvel, fields = hops(native.model, 100)
+    fields = {"geom_pos": fields["geom_pos"]}
+    made = physics.make("mjx", HOPPER, BATCH, watch=WATCH, fields=tuple(fields), impl="warp")
+    ours, reference = (backend.rollout(controls, qpos, qvel, fields) for backend in (made, native))
+    assert ours.valid.all()
+    np.testing.assert_allclose(ours.qpos[..., :3], reference.qpos[..., :3], atol=1e-4, rtol=0)  # 1e-6 measured
+    np.testing.assert_array_equal(ours.touched, reference.touched)
