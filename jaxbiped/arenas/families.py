@@ -157,21 +157,21 @@ LAYOUTS = {
 
 
 def _keep_inside(boxes: Boxes) -> Boxes:
-    """Shorten and move boxes so that their footprints lie within the area."""
+    """Shorten and move boxes so that their footprints lie within the area.
+
+    Only the long side shrinks: a bar stays as wide as it was drawn.
+    """
+    cos, sin = jnp.abs(jnp.cos(boxes.yaw)), jnp.abs(jnp.sin(boxes.yaw))
+    lies_x = boxes.half_x > boxes.half_y  # the long side is the box's own x
+    short = jnp.minimum(boxes.half_x, boxes.half_y)
+    long_x, long_y = jnp.where(lies_x, cos, sin), jnp.where(lies_x, sin, cos)  # how much of it lies along world x, y
+    room_x = (SIZE_X / 2 - long_y * short) / jnp.maximum(long_x, 1e-6)
+    room_y = (SIZE_Y / 2 - long_x * short) / jnp.maximum(long_y, 1e-6)
+    long = jnp.minimum(jnp.maximum(boxes.half_x, boxes.half_y), jnp.minimum(room_x, room_y))
+    boxes = replace(boxes, half_x=jnp.where(lies_x, long, short), half_y=jnp.where(lies_x, short, long))
     extent_x, extent_y = footprint_extent(boxes)
-    scale = jnp.minimum(
-        1.0, jnp.minimum(0.5 * SIZE_X / jnp.maximum(extent_x, 1e-6), 0.5 * SIZE_Y / jnp.maximum(extent_y, 1e-6))
-    )
-    extent_x, extent_y = extent_x * scale, extent_y * scale
-    # Only the long side shrinks: a bar stays as wide as it was drawn.
-    long_x = boxes.half_x > boxes.half_y
-    return replace(
-        boxes,
-        x=jnp.clip(boxes.x, extent_x, SIZE_X - extent_x),
-        y=jnp.clip(boxes.y, extent_y, SIZE_Y - extent_y),
-        half_x=jnp.where(long_x, boxes.half_x * scale, boxes.half_x),
-        half_y=jnp.where(long_x, boxes.half_y, boxes.half_y * scale),
-    )
+    x, y = jnp.clip(boxes.x, extent_x, SIZE_X - extent_x), jnp.clip(boxes.y, extent_y, SIZE_Y - extent_y)
+    return replace(boxes, x=x, y=y)
 
 
 def _keep_ends_free(boxes: Boxes, start: Float[Array, "2"], goal: Float[Array, "2"]) -> Boxes:

@@ -22,7 +22,7 @@ from jaxbiped.sensing.localisation import predict
 from jaxbiped.sensing.view import Sightings, View
 
 SENSE = 1  # channel of a mission's seed
-ORACLE_SPACING = 0.05  # [m] one column of the oracle's points for each cell of the paper's grid
+ORACLE_SPACING = 0.05  # [m] one column of the oracle's points for each cell of the paper's grid, and of finer ones
 ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid by itself
 
 
@@ -51,7 +51,9 @@ def sense(world: World, mind: Mind, arena: Arena, settings: Settings, program: P
     seed = fold(world.seed, SENSE, world.decisions)
     if program.sensor == "oracle":
         area = (program.spec.size_x, program.spec.size_y)
-        view = oracle.measure(arena, world.pose, area, spacing=ORACLE_SPACING, weight=ORACLE_WEIGHT)
+        view = oracle.measure(
+            arena, world.pose, area, spacing=min(ORACLE_SPACING, program.spec.pitch), weight=ORACLE_WEIGHT
+        )
     else:
         view = raycast.measure(
             arena, world.pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat

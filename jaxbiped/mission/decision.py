@@ -76,11 +76,8 @@ def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, setting
     belief = correct(mind.belief, arena.landmarks, sightings)
     pose = belief.pose
     level = jnp.round(pose.z / spec.level_height).astype(jnp.int8)
-    untouched = jnp.sum(mind.grid_map.votes) == 0
-    radius = jnp.where(untouched, settings.limits.body_radius, -1.0)
-    grid_map = mind.grid_map
-    marked = mapping.mark_footprint(grid_map, pose.x, pose.y, level, radius, spec)
-    grid_map = jax.tree.map(lambda new, old: jnp.where(untouched, new, old), marked, grid_map)
+    first = mapping.mark_footprint(mapping.empty(spec), pose.x, pose.y, level, settings.limits.body_radius, spec)
+    grid_map = jax.tree.map(lambda new, old: jnp.where(mind.fresh, new, old), first, mind.grid_map)
     tilted = program.sensor != "oracle"  # whose points have no attitude error to take out
     grid_map = mapping.update(grid_map, view, pose, settings.body, settings.mapping, spec, refit=tilted)
     classes, levels = mapping.classify(grid_map, settings.mapping, spec)
@@ -91,7 +88,8 @@ def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, setting
     ground = jnp.where(level > 0, Cell.BUMP, Cell.FLOOR).astype(jnp.int8)
     classes = classes.at[ij[0], ij[1]].set(jnp.where(own == Cell.GATE, own, ground))
     levels = levels.at[ij[0], ij[1]].set(level)
-    return replace(mind, belief=belief, grid_map=grid_map), classes, levels, ij, goal_ij
+    mind = replace(mind, belief=belief, grid_map=grid_map, fresh=jnp.zeros_like(mind.fresh))
+    return mind, classes, levels, ij, goal_ij
 
 
 def choose(

@@ -9,7 +9,7 @@ place in the queue.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -147,7 +147,10 @@ def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program
             return jnp.where(ended.reshape(-1, *[1] * (new.ndim - 1)), new, old)
 
         world = jax.tree.map(renew, fresh_world, world)
-        mind = jax.tree.map(renew, fresh_mind, queue.mind)
+        # The map is left as it is: a fresh mind does not look at it, and wiping it here costs a pass over it.
+        grid_map = queue.mind.grid_map
+        mind = jax.tree.map(renew, replace(fresh_mind, grid_map=None), replace(queue.mind, grid_map=None))
+        mind = replace(mind, grid_map=grid_map)
         return Queue(world, mind, job, queue.next_job + jnp.sum(ended, dtype=jnp.int32), result)
 
     return jax.lax.while_loop(unfinished, turn, (jnp.int32(0), queue))[1]

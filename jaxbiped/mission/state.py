@@ -42,6 +42,7 @@ class Mind:
     squat: Bool[Array, "*B"]
     look: Bool[Array, "*B"]  # the next measurement looks down before the feet
     tries: Int[Array, "*B"]  # measurements in a row that showed no path
+    fresh: Bool[Array, "*B"]  # nothing measured yet: whatever the map holds is of no mission of this robot
 
 
 def start(arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridSpec) -> tuple[World, Mind]:
@@ -55,4 +56,4 @@ def start(arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridS
     world = World(pose, no, jnp.zeros(()), jnp.zeros(()), zero, zero, code, seed)
     level = jnp.round(pose.z / spec.level_height)
     belief = Belief(Pose(x, y, level * spec.level_height, yaw), jnp.diag(settings.limits.start_variance))
-    return world, Mind(belief, empty(spec), no, no, zero)
+    return world, Mind(belief, empty(spec), no, no, zero, ~no)
