@@ -59,9 +59,8 @@ def main(paper: bool = False, draws: int = 16) -> None:
                 print(f"    {name} {'mm' if name in MILLIMETRES else 'deg'}: bears {borne} of {list(values)}")
         for degrees in (0.5, 1.0, 2.0):
             offsets = [np.radians(degrees) * np.random.default_rng(k).standard_normal(12) for k in range(draws)]
-            print(
-                f"    servo offsets sd {degrees:g} deg {rate(table, robot, (Disturbance(servo=tuple(o)) for o in offsets))}"
-            )
+            trials = [Disturbance(servo=tuple(o)) for o in offsets]
+            print(f"    servo offsets sd {degrees:g} deg {rate(table, robot, trials)}")
 
 
 def nominal(request: ask.Request, robot: RobotModelConfig) -> str:
@@ -71,11 +70,10 @@ def nominal(request: ask.Request, robot: RobotModelConfig) -> str:
     except InputError as error:
         return f"{request.duration:g} s: {error}"
     outcome = play(table, robot, record=True)
-    return (
-        f"{table.duration:g} s: ends {1000 * np.hypot(*outcome.error[:2]):.1f} mm, "
-        f"{math.degrees(outcome.error[2]):.2f} deg off; ZMP margin planned {1000 * table.margin:.0f}, measured {1000 * outcome.zmp_margin:.0f} mm; "
-        f"peak {outcome.peak_torque:.2f} Nm, {math.degrees(outcome.peak_speed):.0f} deg/s"
-    )
+    off = f"{1000 * np.hypot(*outcome.error[:2]):.1f} mm, {math.degrees(outcome.error[2]):.2f} deg"
+    margins = f"planned {1000 * table.margin:.0f}, measured {1000 * outcome.zmp_margin:.0f} mm"
+    peaks = f"{outcome.peak_torque:.2f} Nm, {math.degrees(outcome.peak_speed):.0f} deg/s"
+    return f"{table.duration:g} s: ends {off} off; ZMP margin {margins}; peak {peaks}"
 
 
 def passes(table: PrimitiveTable, robot: RobotModelConfig, disturbance: Disturbance) -> bool:

@@ -12,6 +12,8 @@ from jaxbiped.motion.biped import JOINTS, SIDES, RobotModelConfig, centres_of_ma
 TIMESTEP = 0.005  # [s]: at 16 ms it slips or falls
 SOLVER = {"iterations": 10, "ls_iterations": 20, "impratio": 10.0}
 """Enough iterations that more change nothing; impratio 10 keeps soft contacts from creeping (with 4 and 6 it falls)."""
+MARGIN = 0.0005  # [m] early contact of the feet: without it all but one contact of a foot on a box come and go, and in
+# the 25 s that a slow step down stands on one foot it turns by 4 degrees; with it by 0.01
 FAR = 100.0  # [m] below the ground where unused boxes lie
 FEET, UPPER = 1, 2  # contact bits: feet meet floor and boxes, torso and head meet boxes, the robot never itself
 AXES = {"yaw": (0, 0, 1), "roll": (1, 0, 0), "pitch": (0, 1, 0)}
@@ -141,7 +143,7 @@ def _torso_geoms(torso, config: RobotModelConfig) -> None:
 def _foot_geoms(foot, side: str, config: RobotModelConfig) -> None:
     body, contact = config.proportions, config.contact
     bits = {"contype": FEET, "conaffinity": 0, "mass": 0, "friction": (contact.friction, 0.005, 0.0001), "priority": 1,
-            "condim": 3, "solref": (0.01, 1.0), "rgba": DARK}  # fmt: skip
+            "condim": 3, "margin": MARGIN, "solref": (0.01, 1.0), "rgba": DARK}  # fmt: skip
     half = np.array([body.foot_length, body.foot_width, body.foot_thickness]) / 2
     if contact.foot == "box":
         foot.add_geom(name=f"foot_{side}", type=mujoco.mjtGeom.mjGEOM_BOX, size=half,
