@@ -64,11 +64,16 @@ def dispatch(name: str, rest: list[str]) -> int:
     module_name, options_name, _, takes_file = COMMANDS[name]
     module = importlib.import_module(f"jaxbiped.commands.{module_name}")
     options: type[Model] = getattr(module, options_name)
-    default = tyro.MISSING
-    if takes_file and rest and not rest[0].startswith("-"):
-        path = Path(rest.pop(0))
-        default = parse(options, load_toml(path), file=path)
-    extra = {} if default is tyro.MISSING else {"default": default}
+    extra = {}
+    path = Path(rest.pop(0)) if takes_file and rest and not rest[0].startswith("-") else None
+    data = load_toml(path) if path else {}
+    if "mission" in options.model_fields and "--preset" in rest[:-1]:
+        # The preset decides the defaults of other options, so that it must be known before they are read.
+        data = data | {"mission": data.get("mission", {}) | {"preset": rest[rest.index("--preset") + 1]}}
+    if data or path:
+        required = {name for name, field in options.model_fields.items() if field.is_required()}
+        known = parse(options, data | dict.fromkeys(required, "-"), file=path)
+        extra["default"] = known.model_copy(update=dict.fromkeys(required, tyro.MISSING))
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
@@ -90,6 +95,7 @@ def one_line(box: str) -> InputError:
     rows = [row for line in box.splitlines() if (row := line.strip("│| "))]
     rows = itertools.dropwhile(is_rule, rows[1:])
     message = " ".join(itertools.takewhile(lambda row: not is_rule(row), rows))
+    message = re.sub(r"\[/?bold\]", "", message)
     model = re.match(
         r"Error parsing (\S+): .*? for \w+ (?:(?!Value error)(\S+) )?(.*?) \[type=\w+, input_value=(.*?), input_type",
         message,

@@ -22,8 +22,8 @@ Angle = Annotated[float, pydantic.Field(ge=-2 * math.pi, le=2 * math.pi)]
 Fraction = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Point = tuple[Metres, Metres]
 
-START_CLEARANCE = 0.08  # [m] no box that is higher than a step may be nearer to the start or the goal
-STEP = 0.03  # [m]
+# Of the robot of the paper: no box between a step above the ground and its head may be nearer to the start or the goal.
+START_CLEARANCE, STEP, STANDING, SQUATTING = 0.08, 0.03, 0.385, 0.34  # [m]
 
 
 class BoxConfig(Model):
@@ -139,15 +139,20 @@ def _check(scene: SceneConfig, path: str | Path) -> None:
                 field=f"boxes.{m}",
                 value=list(box.centre),
             )
-        for field, (px, py) in (("start", scene.start[:2]), ("goal", scene.goal)):
-            dx, dy = px - x, py - y
-            along = math.cos(box.yaw) * dx + math.sin(box.yaw) * dy
-            across = math.cos(box.yaw) * dy - math.sin(box.yaw) * dx
-            near = math.hypot(max(abs(along) - box.size[0] / 2, 0), max(abs(across) - box.size[1] / 2, 0))
-            if near < START_CLEARANCE and box.bottom == 0 and box.top > 2 * STEP:
-                raise InputError(
-                    f"must be at least {START_CLEARANCE:g} m away from boxes.{m}, an obstacle",
-                    file=path,
-                    field=field,
-                    value=[px, py],
-                )
+    for field, point, head in (("start", scene.start[:2], STANDING), ("goal", scene.goal, SQUATTING)):
+        ground = max((box.top for box in scene.boxes if box.bottom == 0 and distance(box, point) == 0), default=0.0)
+        if ground > 2 * STEP:
+            raise InputError("must not lie on an obstacle", file=path, field=field, value=list(point))
+        for m, box in enumerate(scene.boxes):
+            between = box.top > ground + STEP + 1e-6 and box.bottom < ground + head
+            if between and distance(box, point) < START_CLEARANCE:
+                message = f"must be at least {START_CLEARANCE:g} m away from boxes.{m}, an obstacle there"
+                raise InputError(message, file=path, field=field, value=list(point))
+
+
+def distance(box: BoxConfig, point: tuple[float, float]) -> float:
+    """Distance [m] in plan from a point to a box; 0 inside."""
+    dx, dy = point[0] - box.centre[0], point[1] - box.centre[1]
+    along = math.cos(box.yaw) * dx + math.sin(box.yaw) * dy
+    across = math.cos(box.yaw) * dy - math.sin(box.yaw) * dx
+    return math.hypot(max(abs(along) - box.size[0] / 2, 0), max(abs(across) - box.size[1] / 2, 0))

@@ -11,6 +11,8 @@ from jaxtyping import Array, Float
 
 from jaxbiped.errors import InputError
 
+MOST_CELLS = 4_000_000  # of a grid: more than a map of this kind ever has, and what memory holds
+
 
 class Cell(enum.IntEnum):
     """Class of a cell of the 2D grid map (paper, 2.2)."""
@@ -63,6 +65,9 @@ class GridSpec:
         for name, (good, what) in allowed.items():
             if not good:
                 raise InputError(f"must be {what}", field=name, value=getattr(self, name))
+        if self.shape[0] * self.shape[1] > MOST_CELLS:
+            area = f"{self.size_x:g} x {self.size_y:g} m"
+            raise InputError(f"must give at most {MOST_CELLS} cells on {area}", field="pitch", value=self.pitch)
 
     @property
     def shape(self) -> tuple[int, int]:

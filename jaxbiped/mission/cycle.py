@@ -22,7 +22,9 @@ from jaxbiped.sensing.localisation import predict
 from jaxbiped.sensing.view import Sightings, View
 
 SENSE = 1  # channel of a mission's seed
-ORACLE_SPACING = 0.05  # [m] one column of the oracle's points for each cell of the paper's grid, and of finer ones
+ORACLE_SPACING = (
+    0.02  # [m] of the columns of the oracle's points, or a cell's pitch if that is less; thinner walls slip through
+)
 ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid by itself
 
 

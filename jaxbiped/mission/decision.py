@@ -15,6 +15,7 @@ from jaxbiped import mapping, planning
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
@@ -51,7 +52,7 @@ def decide(
       The mind after the measurement, the command, the code with which the mission ends of the robot's own
       will (else RUNNING), and the thought.
     """
-    mind, classes, levels, ij, goal_ij = jax.vmap(perceive, in_axes=(0, 0, 0, 0, 0, None))(
+    mind, classes, levels, ij = jax.vmap(perceive, in_axes=(0, 0, 0, 0, 0, None))(
         mind, view, sightings, arena, settings, program
     )
     spec = program.spec
@@ -59,6 +60,9 @@ def decide(
     plan_classes = jnp.where(blind[:, None, None], jnp.int8(Cell.FLOOR), classes)
     plan_levels = jnp.where(blind[:, None, None], jnp.int8(0), levels)
     costs, rules = settings.costs.at_pitch(spec.pitch), settings.strategy.rules()
+    goal_ij = jax.vmap(goal_cell, in_axes=(0, 0, 0, 0, None))(
+        arena.goal_xy, settings.limits.goal_radius, plan_classes, rules, spec
+    )
     to_go = planning.field(plan_classes, plan_levels, costs, rules, goal_ij)
     heading = jax.vmap(nearest_direction)(mind.belief.pose.yaw)
     directions = planning.next_step(
@@ -71,7 +75,7 @@ def decide(
 
 
 def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program):
-    """One robot after a measurement: its mind, the classed map, its cell and the goal's."""
+    """One robot after a measurement: its mind, the classed map, and its cell."""
     spec = program.spec
     belief = correct(mind.belief, arena.landmarks, sightings)
     pose = belief.pose
@@ -82,14 +86,13 @@ def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, setting
     grid_map = mapping.update(grid_map, view, pose, settings.body, settings.mapping, spec, refit=tilted)
     classes, levels = mapping.classify(grid_map, settings.mapping, spec)
     ij = cell_of(pose.x, pose.y, spec)
-    goal_ij = cell_of(arena.goal_xy[0], arena.goal_xy[1], spec)
     # Where the robot stands it can stand, on the level that it stands on, whatever the map makes of it.
     own = classes[ij[0], ij[1]]
     ground = jnp.where(level > 0, Cell.BUMP, Cell.FLOOR).astype(jnp.int8)
     classes = classes.at[ij[0], ij[1]].set(jnp.where(own == Cell.GATE, own, ground))
     levels = levels.at[ij[0], ij[1]].set(level)
     mind = replace(mind, belief=belief, grid_map=grid_map, fresh=jnp.zeros_like(mind.fresh))
-    return mind, classes, levels, ij, goal_ij
+    return mind, classes, levels, ij
 
 
 def choose(

@@ -60,7 +60,7 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
     dx, dy = command.length * jnp.cos(command.turn), command.length * jnp.sin(command.turn)
     x, y = to_world(world.pose, dx, dy)
     yaw = wrap_angle(world.pose.yaw + command.turn)
-    expected = world.pose.z + command.rise * settings.body.step
+    expected = world.pose.z + command.rise * limits.rise
     around = jnp.array([-1.0, 0.0, 1.0]) * limits.edge_tolerance
     grounds = ground_height(arena.boxes, x + around * jnp.cos(yaw), y + around * jnp.sin(yaw))
     error = jnp.abs(grounds - expected)

@@ -16,6 +16,7 @@ from jaxbiped import planning
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.mapping import Body, Cell, truth_grid
 from jaxbiped.mission.decision import nearest_direction
+from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.motion.selection import cell_of
 
@@ -38,7 +39,6 @@ def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePl
     """
     spec = program.spec
     start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(arenas.start_xyyaw[:, 0], arenas.start_xyyaw[:, 1], spec)
-    goal_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(arenas.goal_xy[:, 0], arenas.goal_xy[:, 1], spec)
     heading = jax.vmap(nearest_direction)(arenas.start_xyyaw[:, 2])
     row = jnp.arange(start_ij.shape[0])
 
@@ -58,6 +58,9 @@ def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePl
         floor, flat = jnp.full_like(classes, Cell.FLOOR), jnp.zeros_like(levels)
         blind = setting.strategy.blind
         grid, ground = jnp.where(blind, floor, classes), jnp.where(blind, flat, levels)
+        goal_ij = jax.vmap(goal_cell, in_axes=(0, None, 0, None, None))(
+            arenas.goal_xy, setting.limits.goal_radius, grid, rules, spec
+        )
         to_go = planning.field(grid, ground, costs, rules, goal_ij).cost
         cost = to_go[row, start_ij[:, 0], start_ij[:, 1]]
         path = planning.next_step(to_go, grid, ground, costs, rules, start_ij, heading, length=2 * sum(spec.shape))

@@ -25,14 +25,15 @@ from jaxbiped.sensing.presets import PRESETS
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
 
-Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e6)]
+# Bounded so that sums of costs along a path keep their differences in single precision.
+Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
 
 
 class CostConfig(Model):
     """Costs of Eq. (1) on a pitch of 5 cm; the paper's values (3.1). Other pitches: `planning.Costs.at_pitch`."""
 
-    c0: Cost = 1.0
-    """Distance, a cell."""
+    c0: Annotated[float, pydantic.Field(ge=0.1, le=1e3)] = 1.0
+    """Distance, a cell. Never free: a path must come nearer to its goal with each cell."""
     c1: Cost = 1.0
     """Floor to floor."""
     c2: Cost = 5.0
@@ -63,7 +64,7 @@ class MissionConfig(Model):
 
     sensor: Literal["raycast", "oracle"] = "raycast"
     preset: Literal["ideal", "rendered", "real"] = "rendered"
-    """How well the camera measures: fills in `stereo` and `landmarks`, where these are not given."""
+    """How well the camera measures: the default of each number of `stereo` and `landmarks`."""
     executor: Literal["kinematic"] = "kinematic"
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
@@ -82,13 +83,15 @@ class MissionConfig(Model):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _fill_in(cls, data):
-        """What is at its default comes from the preset: a command line fills in all defaults."""
+        """What is not given comes from the preset, field by field."""
         preset = PRESETS.get(data.get("preset", "rendered")) if isinstance(data, dict) else None
         if preset is None:
             return data
-        defaults = {"stereo": NoiseConfig(), "landmarks": LandmarkConfig()}
-        same = {name: data.get(name, default) in (default, default.model_dump()) for name, default in defaults.items()}
-        return data | {name: getattr(preset, name) for name, is_default in same.items() if is_default}
+        filled = {}
+        for name in ("stereo", "landmarks"):
+            given = data.get(name, {})
+            filled[name] = getattr(preset, name).model_dump() | given if isinstance(given, dict) else given
+        return data | filled
 
     def grid(self, size_xy: tuple[float, float]) -> GridSpec:
         """The static grid of an area [m]; InputError when the pitch does not divide it."""
@@ -114,6 +117,7 @@ class MissionConfig(Model):
                 edge_tolerance=jnp.float32(limits.edge_tolerance),
                 height_tolerance=jnp.float32(limits.height_tolerance),
                 body_radius=jnp.float32(self.robot.body_radius),
+                rise=jnp.float32(GridSpec().level_height),
                 start_variance=jnp.array([sd**2, sd**2, sd_yaw**2], jnp.float32),
             ),
         )
@@ -129,6 +133,7 @@ class Limits:
     edge_tolerance: Float[Array, "*B"]  # [m]
     height_tolerance: Float[Array, "*B"]  # [m]
     body_radius: Float[Array, "*B"]  # [m]
+    rise: Float[Array, "*B"]  # [m] that a step up or down goes: one level
     start_variance: Float[Array, "*B 3"]  # [m2, m2, rad2]
 
 

@@ -68,7 +68,8 @@ def move_kind(here, there, sides, corner_cutting) -> Int8[Array, "*S"]:
     (kind_a, level_a), (kind_b, level_b) = here, there
     rise = jnp.abs(level_a.astype(jnp.int16) - level_b.astype(jnp.int16))
     rise = jnp.where(rise == 0, LEVEL, jnp.where(rise == 1, STEP, FORBIDDEN)).astype(jnp.int8)
-    kind = jnp.maximum(jnp.maximum(kind_a, kind_b), rise)
+    kind = jnp.maximum(kind_a, kind_b)
+    kind = jnp.where(kind == UNMEASURED, UNMEASURED, jnp.maximum(kind, rise)).astype(jnp.int8)
     if sides is not None:
         one, both = jnp.maximum(*sides) == FORBIDDEN, jnp.minimum(*sides) == FORBIDDEN
         kind = jnp.where(both | (one & ~jnp.asarray(corner_cutting)), FORBIDDEN, kind).astype(jnp.int8)
@@ -120,7 +121,8 @@ def edge_costs(
 
     Args:
       classes: a `mapping.grid.Cell` each.
-      levels: height of each cell's ground in steps; ends more than one step apart are not joined.
+      levels: height of each cell's ground in steps; ends more than one step apart are not joined. That of an
+        unmeasured cell is not known, and not read.
       costs, rules: scalars or [B] leaves; the paper's by default.
 
     Deviation: the paper says nothing of oblique moves past the corner of an obstacle; `Rules.corner_cutting`.

@@ -129,8 +129,12 @@ def run_all(
     work = compile_queue(batch, points, hands[0], static, min(slots, length))
     ended, lock = [0] * workers, threading.Lock()
 
+    stop = threading.Event()
+
     def play(worker: int) -> Result:
         def tell(done: int) -> None:
+            if stop.is_set():
+                raise InterruptedError
             with lock:
                 ended[worker] = done
                 on_progress(sum(ended))
@@ -138,7 +142,11 @@ def run_all(
         return jax.device_get(work(batch, points, hands[worker], tell))
 
     with ThreadPoolExecutor(workers) as pool:
-        results = list(pool.map(play, range(workers)))
+        try:
+            results = list(pool.map(play, range(workers)))
+        except BaseException:
+            stop.set()  # an interrupt shall not wait for the whole shard
+            raise
     out = jax.tree.map(lambda leaf: np.zeros((kinds, count), leaf.dtype), results[0])
     for worker, result in enumerate(results):
         mine = np.arange(worker, count * kinds, workers)

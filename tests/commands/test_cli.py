@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 
 from jaxbiped import cli, files
+from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.study.schema import SCHEMA
 
 SCENE = "configs/scenes/experiment_5.toml"
@@ -117,16 +118,41 @@ def test_run_writes_its_folder(here, capsys):
 
 
 def test_compare_writes_its_folder_and_report_reads_it(here, capsys):
-    argv = ["compare", "--arenas", "6", "--strategies", "full", "floor_only", "--out", "mine"]
+    argv = ["compare", "--arenas", "24", "--strategies", "full", "floor_only", "--out", "mine"]
     assert cli.main(argv) == 0
     rows = pl.read_parquet(here / "mine" / "rows")
-    assert rows.schema == SCHEMA and len(rows) == 12
+    assert rows.schema == SCHEMA and len(rows) == 48
     manifest = json.loads((here / "mine" / "manifest.json").read_text())
-    assert manifest["state"] == "finished" and manifest["arenas"] == 6 and "out" not in manifest["config"]
+    assert manifest["state"] == "finished" and manifest["arenas"] == 24 and "out" not in manifest["config"]
     summary = (here / "mine" / "summary.md").read_text()
     assert cli.main(["report", "mine"]) == 0
     assert (here / "mine" / "summary.md").read_text() == summary
     assert "full" in capsys.readouterr().out
+
+
+@pytest.fixture
+def parsed(here, monkeypatch):
+    """The options that a command line of `compare` comes to."""
+    from jaxbiped.commands import compare
+
+    def parse(*argv: str):
+        caught = []
+        monkeypatch.setattr(compare, "main", lambda args: caught.append(args) or 0)
+        assert cli.main(["compare", *argv]) == 0
+        return caught[0].mission
+
+    (here / "real.toml").write_text("[mission]\npreset = 'real'\n[mission.stereo]\nsd = 0.5\n")
+    return parse
+
+
+def test_presets_are_defaults_field_by_field(parsed):
+    real, ideal = PRESETS["real"].stereo, PRESETS["ideal"].stereo
+    assert parsed().stereo == PRESETS["rendered"].stereo
+    assert parsed("--preset", "real").stereo == real
+    assert parsed("--preset", "real", "--stereo.bias", "0.33").stereo == real.model_copy(update={"bias": 0.33})
+    assert parsed("real.toml").stereo == real.model_copy(update={"sd": 0.5})
+    assert parsed("real.toml", "--preset", "ideal").stereo == ideal.model_copy(update={"sd": 0.5})
+    assert parsed("real.toml", "--preset", "ideal").landmarks == PRESETS["ideal"].landmarks
 
 
 @pytest.mark.parametrize("command", sorted(cli.COMMANDS))

@@ -51,7 +51,7 @@ def test_crossing_takes_the_time_of_the_paper(outcomes):
     assert mean(outcomes["experiment_5"], "time") == pytest.approx(600, rel=0.25)
 
 
-def test_gate_takes_the_time_of_the_paper(outcomes):
+def test_gate_takes_the_time_of_the_paper_and_of_three_more_gate_cells(outcomes):
     """Table 4: 9.2 min for 104 cm, which leaves room for two or three cells of gate (48 s each).
 
     Grown by the robot's radius on both sides, our lintel of 5 cm is a gate of five or six cells: 150 s more.

@@ -26,11 +26,11 @@ def edge_costs(classes, levels, costs=(1, 1, 5, 10, 100), corner_cutting=False, 
                 a, b = i + di, j + dj
                 if not (0 <= a < height and 0 <= b < width) or blocked(i, j) or blocked(a, b):
                     continue
-                rise = abs(int(levels[i, j]) - int(levels[a, b]))
+                ends = {classes[i, j], classes[a, b]}
+                rise = 0 if Cell.UNMEASURED in ends else abs(int(levels[i, j]) - int(levels[a, b]))
                 sides = int(blocked(a, j)) + int(blocked(i, b)) if di and dj else 0
                 if rise > 1 or sides == 2 or (sides == 1 and not corner_cutting):
                     continue
-                ends = {classes[i, j], classes[a, b]}
                 motion = c4 if Cell.UNMEASURED in ends else c3 if rise else c2 if Cell.GATE in ends else c1
                 out[k, i, j] = c0 * (np.sqrt(2) if di and dj else 1) + motion
     return out
@@ -63,7 +63,7 @@ def random_grids(rng, batch, height, width, blocked=0.25):
     """Classes and levels of any kind, thrown cell by cell: nastier than any real map."""
     rest = (1 - blocked) * np.array([0.1, 0.65, 0.15, 0.1])
     classes = rng.choice(5, size=(batch, height, width), p=[*rest, blocked])
-    levels = np.where(classes == Cell.BUMP, rng.integers(1, 3, classes.shape), 0)
+    levels = np.where(classes == Cell.FLOOR, 0, rng.integers(0, 3, classes.shape))
     return classes.astype(np.int8), levels.astype(np.int8)
 
 

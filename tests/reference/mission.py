@@ -17,6 +17,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.decision import LOOK_AROUND, TRIES
+from jaxbiped.mission.goal import MARGIN
 from jaxbiped.mission.outcome import Code
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.motion.selection import stride
@@ -92,7 +93,8 @@ def cycle(world, mind, arena, settings, program) -> Step:
     marks = sensing.sight_landmarks(
         arena, world.pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
     )
-    classes, levels, ij, goal_ij = perceive(mind, view, marks, arena, settings, program.spec)
+    classes, levels, ij = perceive(mind, view, marks, arena, settings, program.spec)
+    goal_ij = goal_cell(arena.goal_xy, classes, settings, program.spec)
     pose = sensing.mean_of(mind.belief)
     command, verdict = decide(mind, classes, levels, ij, goal_ij, settings, program.spec)
     conclude(world, mind, command, verdict, arena, settings)
@@ -100,7 +102,7 @@ def cycle(world, mind, arena, settings, program) -> Step:
 
 
 def perceive(mind, view, marks, arena, settings, spec):
-    """Localise and update the map: classes, levels, the robot's cell and the goal's."""
+    """Localise and update the map: classes, levels, and the robot's cell."""
     mind.belief = sensing.correct(mind.belief, arena.landmarks, marks)
     x, y, yaw = sensing.mean_of(mind.belief)
     pose = Pose(f32(x), f32(y), f32(mind.level * spec.level_height), f32(yaw))
@@ -113,7 +115,23 @@ def perceive(mind, view, marks, arena, settings, spec):
     if classes[ij] != Cell.GATE:
         classes[ij] = Cell.BUMP if mind.level else Cell.FLOOR
     levels[ij] = mind.level
-    return classes, levels, ij, motion.cell_of(*arena.goal_xy, spec)
+    return classes, levels, ij
+
+
+def goal_cell(goal_xy, classes, settings, spec):
+    """The nearest cell that is not blocked and whose centre lies well within the goal's circle; else the goal's."""
+    own, rules = motion.cell_of(*goal_xy, spec), settings.strategy
+    found, least = own, math.inf
+    for ij in np.ndindex(*spec.shape):
+        away = math.hypot((ij[1] + 0.5) * spec.pitch - goal_xy[0], (ij[0] + 0.5) * spec.pitch - goal_xy[1])
+        away = 0.0 if ij == own else away
+        kind = classes[ij]
+        blocked = (
+            kind == Cell.OBSTACLE or (kind == Cell.BUMP and not rules.bumps) or (kind == Cell.GATE and not rules.gates)
+        )
+        if away <= settings.limits.goal_radius - MARGIN and (rules.blind or not blocked) and away < least:
+            found, least = ij, away
+    return found
 
 
 def decide(mind, classes, levels, ij, goal_ij, settings, spec):

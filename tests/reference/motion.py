@@ -104,7 +104,7 @@ def kinematic(arena, world, command, settings):
     yaw = wrap(world.pose.yaw + command.turn)
     start = np.array([world.pose.x, world.pose.y])
     end = start + command.length * np.array([math.cos(yaw), math.sin(yaw)])
-    expected = world.pose.z + command.rise * body.step
+    expected = world.pose.z + command.rise * settings.limits.rise
 
     grounds = [ground_height(boxes, *(end + s * limits.edge_tolerance * _heading(yaw))) for s in (-1, 0, 1)]
     error = np.abs(np.float32(grounds) - np.float32(expected))

@@ -34,12 +34,12 @@ def edge_costs(classes, levels, costs, rules):
 
         forbidden = blocked[here] | at(blocked, di, dj)
         rise = np.abs(levels[here] - at(levels, di, dj))
-        forbidden |= rise > 1
+        unmeasured = (classes[here] == Cell.UNMEASURED) | (at(classes, di, dj) == Cell.UNMEASURED)
+        forbidden |= (rise > 1) & ~unmeasured
         if di and dj:
             side_a, side_b = at(blocked, di, 0), at(blocked, 0, dj)
             forbidden |= (side_a & side_b) if rules.corner_cutting else (side_a | side_b)
         gate = (classes[here] == Cell.GATE) | (at(classes, di, dj) == Cell.GATE)
-        unmeasured = (classes[here] == Cell.UNMEASURED) | (at(classes, di, dj) == Cell.UNMEASURED)
         motion = np.where(unmeasured, c4, np.where(rise == 1, c3, np.where(gate, c2, c1)))
         distance = c0 * np.sqrt(2) if di and dj else c0
         out[k, 1:-1, 1:-1] = np.where(forbidden, np.inf, distance + motion)
