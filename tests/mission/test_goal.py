@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.arenas.scene import BoxConfig, SceneConfig, to_arena
+from jaxbiped.arenas.scene import BoxConfig, LandmarkConfig, SceneConfig, to_arena
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.goal import MARGIN, goal_cell
 from jaxbiped.mission.outcome import Code
@@ -15,6 +15,7 @@ from jaxbiped.planning import Rules
 from jaxbiped.sensing.hashing import from_key
 
 SPEC = GridSpec()
+MARKS = tuple(LandmarkConfig(kind="circle", at=at) for at in ((0.6, 0.2), (0.6, 1.2), (1.7, 0.4), (1.7, 1.0)))
 find = jax.jit(lambda goal, classes, rules: goal_cell(goal, jnp.float32(0.1), classes, rules, SPEC))
 
 
@@ -38,7 +39,7 @@ def test_nearest_free_cell_of_the_circle():
 @pytest.mark.parametrize("gap", [0.10, 0.13])
 def test_goal_before_a_wall_is_reached(gap):
     wall = BoxConfig(centre=(1.4 + gap + 0.05, 0.7), size=(0.1, 0.8), top=0.3)
-    arena = to_arena(SceneConfig(name="wall", start=(0.3, 0.7, 0.0), goal=(1.4, 0.7), boxes=(wall,)))
+    arena = to_arena(SceneConfig(name="wall", start=(0.3, 0.7, 0.0), goal=(1.4, 0.7), boxes=(wall,), landmarks=MARKS))
     config = MissionConfig()
     mission = run_logged(arena, config.settings("full"), from_key(jax.random.key(0)), program(config, (1.8, 1.4)))
     assert mission.code == Code.REACHED
@@ -46,7 +47,7 @@ def test_goal_before_a_wall_is_reached(gap):
 
 def test_robot_that_could_step_higher_still_steps_one_level():
     bump = BoxConfig(centre=(0.9, 0.7), size=(0.4, 1.4), top=0.03)
-    arena = to_arena(SceneConfig(name="bump", start=(0.3, 0.7, 0.0), goal=(1.4, 0.7), boxes=(bump,)))
+    arena = to_arena(SceneConfig(name="bump", start=(0.3, 0.7, 0.0), goal=(1.4, 0.7), boxes=(bump,), landmarks=MARKS))
     config = MissionConfig(robot={"step": 0.044})
     mission = run_logged(arena, config.settings("full"), from_key(jax.random.key(0)), program(config, (1.8, 1.4)))
     assert mission.code == Code.REACHED and "Step-up-bump" in {played.name for played in mission.played}
