@@ -77,38 +77,40 @@ def line_sweep(edges, state, step):
             return one(edges[k], jnp.minimum(i, i + side), jnp.where(up, j, j - DJ[k]))
         return jnp.where(up, one(edges[k], i, j), one(edges[k + 4], i, j))
 
-    def row(n, state):
-        cost, rows_now, before, changed, fresh = state
-        i = jnp.where(up, height - n, n + 1)
-        seed = jnp.where(step == 0, take(rows, (i,), (1,))[0], 0.0)
-        active = (take(rows, (i + side,), (1,))[0] > 0) | (fresh > 0) | (seed > 0)
-        cells = jnp.where(active, width, 0)
+    def row(i, seed, state):
+        cost, rows_now, changed = state
 
         def rightwards(n, state):
             line, last = state
             j = n + 1
             new = least(take(line, (j, 0), (1, batch)), last + west(i, j))
             for k in (1, 2, 3):
-                new = least(new, take(before, (j + side * DJ[k], 0), (1, batch)) + across(k, i, j))
+                new = least(new, one(cost, i + side, j + side * DJ[k]) + across(k, i, j))
             return put(line, new, (j, 0)), new
 
         def leftwards(n, state):
             line, last, now = state
             j = width - n
             new = least(take(line, (j, 0), (1, batch)), last + one(edges[0], i, j))
-            now = jnp.where(new < one(cost, i, j), 1.0, now)
+            now = now | (new < one(cost, i, j)).astype(jnp.int32)
             return put(line, new, (j, 0)), new, now
 
         line = take(cost, (i, 0, 0), (1, width + 2, batch))[0]
-        line, _ = lax.fori_loop(0, cells, rightwards, (line, none))
-        line, _, now = lax.fori_loop(0, cells, leftwards, (line, none, jnp.zeros((1, batch), jnp.float32)))
-        fresh = jnp.maximum(jnp.max(now), seed)
-        rows_now = put(rows_now, fresh[None], (i,))
-        return put(cost, line[None], (i, 0, 0)), rows_now, line, jnp.maximum(changed, now), fresh
+        line, _ = lax.fori_loop(0, width, rightwards, (line, none))
+        line, _, now = lax.fori_loop(0, width, leftwards, (line, none, jnp.zeros((1, batch), jnp.int32)))
+        fresh = jnp.maximum(jnp.max(now).astype(jnp.float32), seed)
+        return put(cost, line[None], (i, 0, 0)), put(rows_now, fresh[None], (i,)), changed | now
 
-    blank = jnp.full((width + 2, batch), jnp.inf, cost.dtype)
-    state = cost, jnp.zeros_like(rows), blank, jnp.zeros((1, batch), jnp.float32), jnp.float32(0)
-    cost, rows, _, changed, _ = lax.fori_loop(0, height, row, state)
+    def visit(n, state):
+        i = jnp.where(up, height - n, n + 1)
+        before = i + side
+        seed = jnp.where(step == 0, take(rows, (i,), (1,))[0], 0.0)
+        # a row that is skipped costs nothing at all, not even its copying
+        active = (take(rows, (before,), (1,))[0] > 0) | (take(state[1], (before,), (1,))[0] > 0) | (seed > 0)
+        return lax.fori_loop(0, active.astype(jnp.int32), lambda _, state: row(i, seed, state), state)
+
+    state = cost, jnp.zeros_like(rows), jnp.zeros((1, batch), jnp.int32)
+    cost, rows, changed = lax.fori_loop(0, height, visit, state)
     return (cost, rows), changed[0] > 0
 
 
@@ -141,7 +143,8 @@ def beginning(edges, goal_ij, dtype):
     rows, columns = (lax.broadcasted_iota(jnp.int32, (height, width, 1), a) for a in (0, 1))
     inside = (goal_ij >= 0).all(-1) & (goal_ij[:, 0] < height - 2) & (goal_ij[:, 1] < width - 2)
     goal = inside & (rows == goal_ij[:, 0] + 1) & (columns == goal_ij[:, 1] + 1)
-    return jnp.where(goal, 0.0, jnp.inf).astype(dtype), goal.any((1, 2)).astype(jnp.float32)
+    goal_rows = (inside & (rows[:, 0] == goal_ij[:, 0] + 1)).any(1)
+    return jnp.where(goal, 0.0, jnp.inf).astype(dtype), goal_rows.astype(jnp.float32)
 
 
 def settle(relax, edges, state, most=None):
