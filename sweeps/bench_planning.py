@@ -12,9 +12,10 @@ the least of several repeats, taken in turns, so that other load on the machine 
 Measured on 2 virtual cores of an AMD EPYC (AVX-512, 1 MiB L2 a core) with jax 0.10.2, three runs at a load of 2 to
 3.4 from other work, when two busy processes together got 1 to 1.3 times what one gets alone: only ratios mean
 anything, and even they swing from run to run. "x" is the peer's time over ours. 4,096 maps of 28 x 36, 7.7 to 11 us
-a map: 2.4 to 3.1x pyastar2d, 7 to 12x Dijkstra, 22 to 35x Dijkstra and its graph; the compiled program alone takes 6.5 us of one core a map. 512 maps of 140 x 180: 1.1 to
-1.6x, 6.6 to 8.5x and 17 to 21x. One map of 512 x 512: open 2.5 to 3.0x, rooms 1.0 to 1.3x, maze 0.29 to 0.36x, maze
-with loops 0.45 to 0.51x. Slow: cells thrown at random, 0.13 to 0.15x.
+a map: 2.4 to 3.1x pyastar2d, 7 to 12x Dijkstra, 22 to 35x Dijkstra and its graph; the compiled program alone takes
+6.5 us of one core a map. 512 maps of 140 x 180: 1.1 to 1.6x, 6.6 to 8.5x and 17 to 21x. One map of 512 x 512: open
+2.5 to 3.0x, rooms 1.0 to 1.3x, maze 0.29 to 0.36x, maze with loops 0.45 to 0.51x. Slow: cells thrown at random,
+0.13 to 0.15x.
 Short of their targets: 28 x 36 (5x pyastar2d, 20x Dijkstra) and pyastar2d on 140 x 180 (2x); on the edge: the maze
 (a third). What limits: on 28 x 36 a chunk of 80 arenas, the fewest that compilers vectorise, is twice the L2 cache;
 on 140 x 180 far more.
