@@ -37,6 +37,7 @@ from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.mission import decision
 from jaxbiped.mission.cycle import conclude, cycle, sense
 from jaxbiped.mission.executors import kinematic
+from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.queue import SLOTS, stack
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
@@ -130,7 +131,10 @@ def parts(repeats: int = 20):
     print(f"parts, {SLOTS} missions at once, one after the other (XLA may use all cores here):")
     view, sightings = part("sense", jax.vmap(partial(sense, program=PROGRAM)), world, mind, batch, setting)
     perceive = jax.vmap(partial(decision.perceive, program=PROGRAM))
-    mind, classes, levels, ij, goal_ij = part("map", perceive, mind, view, sightings, batch, setting)
+    mind, classes, levels, ij = part("map", perceive, mind, view, sightings, batch, setting)
+    goal_ij = jax.vmap(partial(goal_cell, spec=spec))(
+        batch.goal_xy, setting.limits.goal_radius, classes, setting.strategy.rules()
+    )
     moves = part("plan", plan, classes, levels, ij, goal_ij, mind.belief.pose.yaw)
     arguments = (mind, ij, goal_ij, moves, classes, levels, blind)
     mind, command, verdict = part("select", choose, *arguments)

@@ -103,14 +103,23 @@ def classify(grid_map: GridMap, params: MapParams, spec: GridSpec) -> tuple[Int[
     A floor cell has level 0 and a bump cell the raised level with most votes; others have the level with most votes
     (a tie goes to the lower).
     """
-    winner = 4 - jnp.argmax(grid_map.votes[..., ::-1], axis=-1)
-    measured = grid_map.votes.sum(-1) >= params.fused_points * spec.cell_share
-    classes = jnp.where(measured, winner, Cell.UNMEASURED)
-    level = jnp.argmax(grid_map.level_votes, axis=-1)
-    raised = 1 + jnp.argmax(grid_map.level_votes[..., 1:], axis=-1) if spec.ground_levels > 1 else level
+    votes = [grid_map.votes[..., k] for k in range(4)]
+    level_votes = [grid_map.level_votes[..., k] for k in range(spec.ground_levels)]
+    measured = sum(votes) >= params.fused_points * spec.cell_share
+    classes = jnp.where(measured, 4 - first_greatest(votes[::-1]), Cell.UNMEASURED)
+    level = first_greatest(level_votes)
+    raised = 1 + first_greatest(level_votes[1:]) if spec.ground_levels > 1 else level
     level = jnp.where(classes == Cell.BUMP, raised, level)
     level = jnp.where((classes == Cell.FLOOR) | ~measured, 0, level)
     return classes.astype(jnp.int8), level.astype(jnp.int8)
+
+
+def first_greatest(values: list[Float[Array, "H W"]]) -> Int[Array, "H W"]:
+    """Index of the first greatest of a few arrays, cell by cell; an `argmax` of so short an axis is not vectorised."""
+    best, index = values[0], jnp.zeros(values[0].shape, jnp.int32)
+    for k, value in enumerate(values[1:], 1):
+        index, best = jnp.where(value > best, k, index), jnp.maximum(best, value)
+    return index
 
 
 def mark_footprint(

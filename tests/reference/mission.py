@@ -94,7 +94,7 @@ def cycle(world, mind, arena, settings, program) -> Step:
         arena, world.pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
     )
     classes, levels, ij = perceive(mind, view, marks, arena, settings, program.spec)
-    goal_ij = goal_cell(arena.goal_xy, classes, settings, program.spec)
+    goal_ij = tuple(map(int, goal_cell(arena.goal_xy, classes, settings, program.spec)))
     pose = sensing.mean_of(mind.belief)
     command, verdict = decide(mind, classes, levels, ij, goal_ij, settings, program.spec)
     conclude(world, mind, command, verdict, arena, settings)
@@ -121,17 +121,14 @@ def perceive(mind, view, marks, arena, settings, spec):
 def goal_cell(goal_xy, classes, settings, spec):
     """The nearest cell that is not blocked and whose centre lies well within the goal's circle; else the goal's."""
     own, rules = motion.cell_of(*goal_xy, spec), settings.strategy
-    found, least = own, math.inf
-    for ij in np.ndindex(*spec.shape):
-        away = math.hypot((ij[1] + 0.5) * spec.pitch - goal_xy[0], (ij[0] + 0.5) * spec.pitch - goal_xy[1])
-        away = 0.0 if ij == own else away
-        kind = classes[ij]
-        blocked = (
-            kind == Cell.OBSTACLE or (kind == Cell.BUMP and not rules.bumps) or (kind == Cell.GATE and not rules.gates)
-        )
-        if away <= settings.limits.goal_radius - MARGIN and (rules.blind or not blocked) and away < least:
-            found, least = ij, away
-    return found
+    blocked = classes == Cell.OBSTACLE
+    blocked |= (classes == Cell.BUMP) & (not rules.bumps)
+    blocked |= (classes == Cell.GATE) & (not rules.gates)
+    x, y = ((np.arange(n, dtype=f32) + f32(0.5)) * f32(spec.pitch) for n in (spec.shape[1], spec.shape[0]))
+    away = np.hypot(x[None, :] - goal_xy[0], y[:, None] - goal_xy[1])
+    away[own] = 0.0
+    near = (away <= settings.limits.goal_radius - MARGIN) & (~blocked | bool(rules.blind))
+    return np.unravel_index(np.where(near, away, np.inf).argmin(), spec.shape) if near.any() else own
 
 
 def decide(mind, classes, levels, ij, goal_ij, settings, spec):
