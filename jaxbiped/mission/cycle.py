@@ -35,7 +35,9 @@ def cycle(
 
     Consumes channels SENSE and ODOMETRY of each mission's seed, counted by its decisions.
     """
-    view, sightings = jax.vmap(sense, in_axes=(0, 0, 0, 0, None))(world, mind, arena, settings, program)
+    sensed = jax.vmap(sense, in_axes=(0, 0, 0, 0, None))(world, mind, arena, settings, program)
+    # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
+    view, sightings = jax.lax.optimization_barrier(sensed)
     if program.sensor == "oracle":
         mind = replace(mind, belief=replace(mind.belief, pose=on_level(world.pose, program)))
     thinking, command, verdict, thought = decide(mind, view, sightings, arena, settings, program)
