@@ -7,11 +7,12 @@
 Both sides use the whole machine, with two threads and two processes, on the same arenas and strategies; compile time
 is apart. The compiled side works the list of missions off several times over, as a study has many.
 
-Measured on two cores of an AMD EPYC (2 MiB of L2, 32 MiB of L3) that other programs kept busy too, jax 0.10.2:
-  compiled 211, 136 and 110 missions/s against 4.0, 2.2 and 2.4 of the reference (23 decisions a mission): ratios of
-  52 to 65, 62 and 39 to 49 in rounds of three runs, 42 by CPU seconds. The same code and number of decisions in all
-  of 150 missions. About 22 s of compiling on a core that is free.
-  A decision: sense 51 us, map 97, plan 12, select 7, execute 6; all 200. The reference: 4.0 ms, 3.2, 1.8 and 0.6.
+Measured on two virtual cores of an AMD EPYC, otherwise idle, jax 0.10.2, three runs of the command:
+  compiled 524 to 584 missions/s (11,900 to 13,200 decisions/s) against 11.8 to 13.0 of the reference: ratios of 44 to 45,
+  by rounds 40 to 51, 45 by CPU seconds. Short of the 50 that were aimed at. The same code and number of decisions in all
+  of 100 missions. 11 s of compiling.
+  A decision: sense 25 us, map 54 to 72, plan 8 to 10, select 4 to 8, execute 3 to 7. The reference: 4.2 ms, 3.7, 1.9, 0.7.
+  The whole cycle takes about 60 us of one core more than its parts do alone; what XLA does there is not found yet.
   --stream: 1,024 arenas in shards of 512 peak at 1.71 GiB, 4,096 at 1.73 GiB.
   --sweep: 20 traces and 19 compilations for the first cost vector, none for the 64 that follow.
 """
