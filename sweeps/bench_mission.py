@@ -8,11 +8,11 @@ Both sides use the whole machine, with two threads and two processes, on the sam
 is apart. The compiled side works the list of missions off several times over, as a study has many.
 
 Measured on two virtual cores of an AMD EPYC, otherwise idle, jax 0.10.2, three runs of the command:
-  compiled 524 to 584 missions/s (11,900 to 13,200 decisions/s) against 11.8 to 13.0 of the reference: ratios of 44 to 45,
-  by rounds 40 to 51, 45 by CPU seconds. Short of the 50 that were aimed at. The same code and number of decisions in all
-  of 100 missions. 11 s of compiling.
-  A decision: sense 25 us, map 54 to 72, plan 8 to 10, select 4 to 8, execute 3 to 7. The reference: 4.2 ms, 3.7, 1.9, 0.7.
-  The whole cycle takes about 60 us of one core more than its parts do alone; what XLA does there is not found yet.
+  compiled 524 to 584 missions/s (11,900 to 13,200 decisions/s) against 11.8 to 13.0 of the reference: ratios of 44
+  to 45, by rounds 40 to 51, 45 by CPU seconds. Short of the 50 that were aimed at. The same code and number of
+  decisions in all of 100 missions. 11 s of compiling.
+  A decision: sense 25 us, map 54 to 72, plan 8 to 10, select 4 to 8, execute 3 to 7. The reference: 4.2 ms, 3.7, 1.9
+  and 0.7. The whole cycle takes about 60 us of one core more than its parts do alone; why, is not found yet.
   --stream: 1,024 arenas in shards of 512 peak at 1.71 GiB, 4,096 at 1.73 GiB.
   --sweep: 20 traces and 19 compilations for the first cost vector, none for the 64 that follow.
 """
