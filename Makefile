@@ -29,6 +29,7 @@ lint: install
 
 bench: install
 	$(BIN)/python sweeps/bench_planning.py
+	$(BIN)/python sweeps/bench_mapping.py
 	$(BIN)/python sweeps/bench_mission.py
 
 clean:
