@@ -13,7 +13,7 @@ Measured on two virtual cores of an AMD EPYC, otherwise idle, jax 0.10.2, three 
   decisions in all of 100 missions. 11 s of compiling.
   A decision: sense 25 us, map 54 to 72, plan 8 to 10, select 4 to 8, execute 3 to 7. The reference: 4.2 ms, 3.7, 1.9
   and 0.7. The whole cycle takes about 60 us of one core more than its parts do alone; why, is not found yet.
-  --stream: 1,024 arenas in shards of 512 peak at 1.71 GiB, 4,096 at 1.73 GiB.
+  --stream: 2,048 arenas in shards of 1,024 peak at 2.67 GiB, 8,192 at 2.64 GiB.
   --sweep: 20 traces and 19 compilations for the first cost vector, none for the 64 that follow.
 """
 
