@@ -130,6 +130,7 @@ def choose(
         length=jnp.where(still, zero, command.length),
         rise=jnp.where(still, 0, command.rise),
         squat=jnp.where(still | (command.primitive == Primitive.LOOK), mind.squat, command.squat),
+        left=jnp.where(still, zero, command.left),
     )
     look = command.primitive == Primitive.LOOK
     return replace(mind, squat=command.squat, look=look, tries=tries), command, verdict.astype(jnp.int32)

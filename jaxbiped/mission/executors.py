@@ -57,7 +57,8 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
     to `edge_tolerance` off, and the height may be off by `height_tolerance`.
     """
     limits = settings.limits
-    dx, dy = command.length * jnp.cos(command.turn), command.length * jnp.sin(command.turn)
+    cos, sin = jnp.cos(command.turn), jnp.sin(command.turn)
+    dx, dy = command.length * cos - command.left * sin, command.length * sin + command.left * cos
     x, y = to_world(world.pose, dx, dy)
     yaw = wrap_angle(world.pose.yaw + command.turn)
     expected = world.pose.z + command.rise * limits.rise
@@ -85,7 +86,7 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
         moved=jnp.stack(moved),
         variances=variances,
         time=duration(command, settings.durations),
-        distance=command.length,
+        distance=jnp.abs(command.length) + jnp.abs(command.left),
         collided=collided,
         fell=fell & ~collided,
         outside=outside,

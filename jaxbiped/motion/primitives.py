@@ -32,13 +32,14 @@ class Primitive(enum.IntEnum):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Command:
-    """One decision of the robot: a turn on the spot, then one primitive."""
+    """One decision of the robot: a turn on the spot, a step to the side, then one primitive."""
 
     turn: Float[Array, "*B"]  # [rad] anticlockwise
     primitive: Int[Array, "*B"]  # Primitive
-    length: Float[Array, "*B"]  # [m] forward, after the turn
+    length: Float[Array, "*B"]  # [m] forward, after the turn; negative: backward
     rise: Int[Array, "*B"]  # levels climbed: -1, 0 or 1
     squat: Bool[Array, "*B"]  # stance in which the primitive is played
+    left: Float[Array, "*B"] | float = 0.0  # [m] to the side, after the turn and before the primitive
 
 
 class DurationConfig(Model):
@@ -81,9 +82,10 @@ class Durations:
 def duration(command: Command, durations: Durations) -> Float[Array, "*B"]:
     """Time [s] that a command takes (Table 2): turns by angle, straight and gate by length, steps by event.
 
-    A step over a bump carries the robot up to one oblique cell forward; what is longer is walked straight.
+    A step over a bump carries the robot up to one oblique cell forward; what is longer is walked straight. Steps to
+    the side and backward, which Table 2 does not have, take as long as forward ones.
     """
-    cells = command.length / CELL
+    cells = jnp.abs(command.length) / CELL
     beyond = jnp.maximum(cells - math.sqrt(2.0), 0.0) * durations.straight
     spent = jnp.stack(
         [
@@ -96,4 +98,5 @@ def duration(command: Command, durations: Durations) -> Float[Array, "*B"]:
         ]
     )
     played = jnp.take_along_axis(spent, command.primitive[None].astype(jnp.int32), axis=0)[0]
-    return jnp.abs(command.turn) / EIGHTH * durations.turn + played
+    aside = jnp.abs(command.left) / CELL * durations.straight
+    return jnp.abs(command.turn) / EIGHTH * durations.turn + aside + played

@@ -92,4 +92,5 @@ def select(
         length=jnp.where(look, 0.0, length),
         rise=jnp.where(over_edge & ~look, rise, 0).astype(jnp.int32),
         squat=gate & ~look,
+        left=jnp.zeros_like(length),
     )

@@ -110,6 +110,7 @@ def test_referee_is_that_of_the_reference(population):
         jnp.asarray(length, jnp.float32),
         jnp.asarray(rise, jnp.int32),
         jnp.asarray(squat),
+        jnp.zeros(PLACES),
     )
     batch = to_device(stack([arenas[k] for k in which]))
     x, y, yaw = (jnp.asarray(v, jnp.float32) for v in (x, y, yaw))
