@@ -10,7 +10,7 @@ from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.decision import Thought, climbed, decide
+from jaxbiped.mission.decision import Thought, climbed, decide, walked
 from jaxbiped.mission.executors import EXECUTORS, Execution
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
@@ -109,4 +109,4 @@ def conclude(
         code=code,
         seed=world.seed,
     )
-    return world, replace(mind, belief=belief)
+    return world, replace(walked(mind, command, executed.moved, executed.variances), belief=belief)

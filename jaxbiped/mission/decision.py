@@ -19,8 +19,11 @@ from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
+from jaxbiped.motion.approach import approach, foresight, next_crossing, remembered
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
+from jaxbiped.sensing import edges
+from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.localisation import correct
 from jaxbiped.sensing.view import Sightings, View
 
@@ -65,11 +68,10 @@ def decide(
     )
     to_go = planning.field(plan_classes, plan_levels, costs, rules, goal_ij)
     heading = jax.vmap(nearest_direction)(mind.belief.pose.yaw)
-    directions = planning.next_step(
-        to_go.cost, plan_classes, plan_levels, costs, rules, ij, heading, length=stride(spec)
-    )
-    mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
-        mind, ij, goal_ij, directions, classes, levels, blind, spec
+    length = max(stride(spec), foresight(spec)) if program.footing else stride(spec)
+    directions = planning.next_step(to_go.cost, plan_classes, plan_levels, costs, rules, ij, heading, length=length)
+    mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, 0, 0, None))(
+        mind, view, ij, goal_ij, directions, classes, levels, blind, settings, program
     )
     return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij, mind.belief.pose)
 
@@ -97,13 +99,15 @@ def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, setting
 
 def choose(
     mind: Mind,
+    view: View,
     ij: Int[Array, "2"],
     goal_ij: Int[Array, "2"],
     directions: Int[Array, "n"],
     classes: Int[Array, "H W"],
     levels: Int[Array, "H W"],
     blind: Bool[Array, ""],
-    spec: GridSpec,
+    settings: Settings,
+    program: Program,
 ) -> tuple[Mind, Command, Int[Array, ""]]:
     """The command of one robot, and whether it gives up.
 
@@ -111,7 +115,11 @@ def choose(
     Without a path it turns on the spot and measures again, all around, before it gives up. The blind strategy
     stops before anything but floor.
     """
-    command = select(mind.belief.pose, ij, jnp.maximum(directions, 0), classes, levels, mind.look, spec)
+    spec = program.spec
+    first = jnp.maximum(directions[: stride(spec)], 0)
+    command = select(mind.belief.pose, ij, first, classes, levels, mind.look, spec)
+    if program.footing:
+        mind, command = place_feet(mind, view, command, ij, directions, classes, levels, settings, program)
     at_goal = jnp.all(ij == goal_ij)
     lost = (directions[0] < 0) & ~at_goal
     tries = jnp.where(lost, mind.tries + 1, 0)
@@ -134,6 +142,43 @@ def choose(
     )
     look = command.primitive == Primitive.LOOK
     return replace(mind, squat=command.squat, look=look, tries=tries), command, verdict.astype(jnp.int32)
+
+
+def place_feet(
+    mind: Mind,
+    view: View,
+    command: Command,
+    ij: Int[Array, "2"],
+    directions: Int[Array, "n"],
+    classes: Int[Array, "H W"],
+    levels: Int[Array, "H W"],
+    settings: Settings,
+    program: Program,
+) -> tuple[Mind, Command]:
+    """The command, or what it takes first for the feet to stand right before the next edge; what is known of that."""
+    spec, pose = program.spec, mind.belief.pose
+    crossing = next_crossing(pose, ij, directions, classes, levels, spec)
+    known = remembered(mind.ahead, crossing)
+    about = jax.tree.map(lambda k, c: jnp.where(known.known, k, c), known, crossing.edge)
+    level = jnp.round(pose.z / spec.level_height).astype(jnp.int32)
+    flat = mapping.level_view(view, level, settings.mapping, spec) if program.sensor != "oracle" else view
+    flat = jax.lax.optimization_barrier(flat)
+    eye = mount(settings.camera, mind.look, mind.squat)
+    seen = edges.measure(flat, about, jnp.clip(crossing.along, -0.1, 0.1), eye, spec.level_height)
+    seen = replace(seen, known=seen.known & crossing.edge.known)
+    ahead = edges.fuse(known, seen)
+    command = approach(
+        command, pose, ij, crossing, ahead, mind.behind, classes, levels, mind.look, settings.footing, spec
+    )
+    return replace(mind, ahead=ahead), command
+
+
+def walked(mind: Mind, command: Command, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> Mind:
+    """What the robot knows of the edges about it after a command, by odometry: what was ahead may now be behind."""
+    ahead, behind = (edges.predict(edge, moved, variances) for edge in (mind.ahead, mind.behind))
+    stepped = command.rise != 0
+    behind = jax.tree.map(lambda a, b: jnp.where(stepped, a, b), ahead, behind)
+    return replace(mind, ahead=replace(ahead, known=ahead.known & ~stepped), behind=behind)
 
 
 def nearest_direction(yaw: Float[Array, ""]) -> Int[Array, ""]:

@@ -14,7 +14,7 @@ from jaxbiped.config import Model
 from jaxbiped.mapping import Body, GridSpec, MapConfig, MapParams
 from jaxbiped.mission.strategies import Strategy, strategy
 from jaxbiped.motion.primitives import DurationConfig, Durations
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.robot import Footing, RobotConfig
 from jaxbiped.planning import Costs
 from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
 from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
@@ -111,6 +111,7 @@ class MissionConfig(Model):
             landmarks=self.landmarks.traced(),
             odometry=self.odometry.traced(),
             mapping=self.mapping.params(),
+            footing=self.robot.footing.traced(),
             limits=Limits(
                 goal_radius=jnp.float32(limits.goal_radius),
                 max_decisions=jnp.int32(limits.max_decisions),
@@ -151,6 +152,7 @@ class Settings:
     landmarks: LandmarkNoise
     odometry: OdometryNoise
     mapping: MapParams
+    footing: Footing
     limits: Limits
 
 
@@ -162,8 +164,10 @@ class Program:
     image: ImageSpec
     sensor: str
     executor: str
+    footing: bool = False  # feet are placed by measured edges; else by cells alone
 
 
 def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
     """The static part of a config for arenas of one size [m]."""
-    return Program(config.grid(size_xy), config.camera.image, config.sensor, config.executor)
+    footing = config.executor != "kinematic"
+    return Program(config.grid(size_xy), config.camera.image, config.sensor, config.executor, footing)

@@ -14,6 +14,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import GridMap, GridSpec, empty
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Settings
+from jaxbiped.sensing.edges import Edge, unknown
 from jaxbiped.sensing.localisation import Belief
 
 
@@ -43,6 +44,8 @@ class Mind:
     look: Bool[Array, "*B"]  # the next measurement looks down before the feet
     tries: Int[Array, "*B"]  # measurements in a row that showed no path
     fresh: Bool[Array, "*B"]  # nothing measured yet: whatever the map holds is of no mission of this robot
+    ahead: Edge  # of the ground, that the robot is about to cross; only where footing counts
+    behind: Edge  # that it crossed last
 
 
 def start(arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridSpec) -> tuple[World, Mind]:
@@ -56,4 +59,4 @@ def start(arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridS
     world = World(pose, no, jnp.zeros(()), jnp.zeros(()), zero, zero, code, seed)
     level = jnp.round(pose.z / spec.level_height)
     belief = Belief(Pose(x, y, level * spec.level_height, yaw), jnp.diag(settings.limits.start_variance))
-    return world, Mind(belief, empty(spec), no, no, zero, ~no)
+    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown())

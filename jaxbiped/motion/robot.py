@@ -2,15 +2,65 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, fields
 from typing import Annotated
 
+import jax
 import jax.numpy as jnp
 import pydantic
+from jaxtyping import Array, Float
 
 from jaxbiped.config import Model
 from jaxbiped.mapping.grid import Body
 
 Length = Annotated[float, pydantic.Field(gt=0.0, le=2.0)]
+
+
+class FootingConfig(Model):
+    """Where a step over an edge wants the robot to stand. The steps of the simulated biped; chosen by simulation.
+
+    Distances to an edge are from the middle between the feet. A step that is 10 cm long, from feet of 10 cm, has the
+    widest tolerance: 8 mm and 6 degrees are fine, 25 mm fails (5 cm long, it has none).
+    """
+
+    length: Length = 0.10
+    """[m] of a step over an edge."""
+    before_up: Length = 0.075
+    """[m] that a rising edge lies ahead of the robot before its step."""
+    before_down: Length = 0.025
+    """[m] that a falling edge lies ahead of the robot before its step."""
+    tolerance: Length = 0.004
+    """[m] off that place, from which the robot corrects."""
+    clear_up: Length = 0.075
+    """[m] beyond an edge that rose, where the robot can turn on the spot."""
+    clear_down: Length = 0.10
+    """[m] beyond an edge that fell, where the robot can turn on the spot."""
+    foot_length: Length = 0.10
+    """[m]"""
+    hip_offset: Length = 0.045
+    """[m] of a foot's middle to the side."""
+    foot_outside: Length = 0.075
+    """[m] of a foot's outer rim to the side."""
+
+    def traced(self) -> Footing:
+        """The same as arrays."""
+        return Footing(**{field.name: jnp.float32(getattr(self, field.name)) for field in fields(Footing)})
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Footing:
+    """`FootingConfig`, traced."""
+
+    length: Float[Array, "*B"]
+    before_up: Float[Array, "*B"]
+    before_down: Float[Array, "*B"]
+    tolerance: Float[Array, "*B"]
+    clear_up: Float[Array, "*B"]
+    clear_down: Float[Array, "*B"]
+    foot_length: Float[Array, "*B"]
+    hip_offset: Float[Array, "*B"]
+    foot_outside: Float[Array, "*B"]
 
 
 class RobotConfig(Model):
@@ -26,6 +76,8 @@ class RobotConfig(Model):
     """[m] head height, squatting."""
     step: Annotated[float, pydantic.Field(gt=0.0, le=0.1)] = 0.03
     """[m] greatest height of one step up or down."""
+    footing: FootingConfig = FootingConfig()
+    """Where its feet want to be before an edge; read where footing counts (simulated bipeds)."""
 
     @pydantic.model_validator(mode="after")
     def _order(self):
