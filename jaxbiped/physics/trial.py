@@ -16,7 +16,6 @@ from jaxbiped.physics.robot import add_terrain, home_qpos, part_geoms, robot_spe
 
 SETTLE = 0.4  # [s] that the robot stands before and after the primitive
 WINDOW = 10  # steps (50 ms) that contact forces are averaged over, less than the pendulum's time constant
-BOXES = 3  # slots of a trial: a bump, or two posts and a lintel
 
 
 @dataclass(frozen=True)
@@ -32,12 +31,6 @@ class Disturbance:
     servo: tuple[float, ...] = (0.0,) * (2 * len(JOINTS))  # [rad] zero offset of each servo
     slope: float = 0.0  # [rad] of all ground, rising ahead
     clearance: float = 0.37  # [m] under the gate's lintel
-
-    @staticmethod
-    def mild(rng: np.random.Generator) -> Disturbance:
-        """A draw of the mild set, which every primitive must bear."""
-        u = rng.uniform
-        return Disturbance(u(0.4, 1.2), u(0.8, 1.2), u(-0.003, 0.003), 0.0, math.radians(u(-3, 3)), u(-0.005, 0.005))
 
 
 class Tolerance(Model):
@@ -78,11 +71,6 @@ class Outcome:
         )
 
 
-def trial_model(robot: RobotModelConfig) -> mujoco.MjModel:
-    """The model that trials are played in."""
-    return add_terrain(robot_spec(robot), BOXES).compile()
-
-
 def nominal_edge(request: Request, robot: RobotModelConfig) -> float:
     """Distance [m] ahead of the robot's middle where a step's edge should be: half way between the limits.
 
@@ -91,6 +79,16 @@ def nominal_edge(request: Request, robot: RobotModelConfig) -> float:
     """
     half = robot.proportions.foot_length / 2
     return (half + request.forward) / 2 if request.rise > 0 else (request.forward - half) / 2
+
+
+def passes_gate(request: Request) -> bool:
+    """Whether a primitive is one that squats, walks and stands up: its trials have a gate."""
+    return request.squat and not request.squat_start and not request.squat_end
+
+
+def boxes_of(request: Request) -> int:
+    """Boxes that a trial of a primitive needs: a bump, or two posts and a lintel."""
+    return 1 if request.rise else 3 if passes_gate(request) else 0
 
 
 def lay_out(model: mujoco.MjModel, table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance) -> float:
@@ -109,7 +107,7 @@ def lay_out(model: mujoco.MjModel, table: PrimitiveTable, robot: RobotModelConfi
         height = abs(request.rise) + sign * d.rise
         start = height if request.rise < 0 else 0.0
         set_box(model, 0, tuple(edge + sign * half * heading), d.yaw, (half, half), -0.1, height)
-    elif request.squat and not request.squat_start and not request.squat_end:
+    elif passes_gate(request):
         head = home_table(robot, False).pelvis[-1, 0]  # which is not above the middle between the feet
         middle, side = np.array([request.forward / 2 + head, d.lateral]), 0.16
         thick = max(
@@ -130,7 +128,7 @@ def play(table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance | None =
       record: measure the zero moment point from contact forces, which takes most of the time.
     """
     d = d or Disturbance()
-    model = trial_model(robot)
+    model = add_terrain(robot_spec(robot), boxes_of(table.request)).compile()
     ground = lay_out(model, table, robot, d)
     data = mujoco.MjData(model)
     home = home_table(robot, table.request.squat_start)
@@ -149,7 +147,7 @@ def play(table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance | None =
         data.ctrl[:] = control
         mujoco.mj_step(model, data)
         if k == rest - 1:
-            start = _stand(data)
+            start = stand(data)
         touched = touched or not limbs.isdisjoint(data.contact.geom.ravel().tolist())
         if k >= rest:
             torque = max(torque, np.abs(data.actuator_force).max())
@@ -157,8 +155,8 @@ def play(table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance | None =
         if record and k >= rest:
             recent = [*recent[-WINDOW + 1 :], ground_force(model, data, foot_of)]
             margin = min(margin, contact_margin(data, robot, np.sum(recent, axis=0)))
-    request, end = table.request, _stand(data)
-    moved = _in_frame(end, start) - [request.forward, request.left, request.turn]
+    request, end = table.request, stand(data)
+    moved = relative(end, start) - [request.forward, request.left, request.turn]
     expected = request.rise + d.rise if request.rise > 0 else 0.0
     height = max(abs(data.site(f"sole_{side}").xpos[2] - expected) for side in SIDES)
     tilt = math.acos(min(1.0, max(-1.0, data.body("torso").xmat[8])))
@@ -201,14 +199,21 @@ def contact_margin(data: mujoco.MjData, robot: RobotModelConfig, feet: np.ndarra
     return float(((points - total[1:] / total[0]) @ normals).max(axis=0).min())
 
 
-def _stand(data: mujoco.MjData) -> np.ndarray:
-    """(x, y, yaw) of the middle between the soles."""
-    left, right = (data.site(f"sole_{side}").xpos[:2] for side in SIDES)
+def stand(data: mujoco.MjData) -> np.ndarray:
+    """[3] where the robot stands: the middle between its soles."""
+    return middle_of(np.stack([data.site(f"sole_{side}").xpos for side in SIDES]))
+
+
+def middle_of(soles: np.ndarray) -> np.ndarray:
+    """[..., 3] (x, y, yaw) of the middle between two soles [..., 2, 2 or 3]: the left and the right."""
+    left, right = soles[..., 0, :2], soles[..., 1, :2]
     across = left - right
-    return np.array([*(left + right) / 2, math.atan2(-across[0], across[1])])
+    yaw = np.arctan2(-across[..., 0], across[..., 1])
+    return np.concatenate([(left + right) / 2, yaw[..., None]], axis=-1)
 
 
-def _in_frame(pose: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    c, s = math.cos(frame[2]), math.sin(frame[2])
-    dx, dy = pose[:2] - frame[:2]
-    return np.array([c * dx + s * dy, -s * dx + c * dy, (pose[2] - frame[2] + math.pi) % (2 * math.pi) - math.pi])
+def relative(pose: np.ndarray, frame: np.ndarray) -> np.ndarray:
+    """[..., 3] a pose (x, y, yaw) in the frame of another."""
+    c, s = np.cos(frame[..., 2]), np.sin(frame[..., 2])
+    dx, dy, turn = (pose[..., k] - frame[..., k] for k in range(3))
+    return np.stack([c * dx + s * dy, -s * dx + c * dy, (turn + math.pi) % (2 * math.pi) - math.pi], axis=-1)

@@ -13,6 +13,7 @@ from jaxbiped.motion.biped import JOINT_NAMES, ContactConfig, RobotModelConfig
 from jaxbiped.motion.gait import generate, home_table
 from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.physics.robot import PARTS, add_terrain, box_slots, home_qpos, part_geoms, robot_spec, set_box
+from jaxbiped.physics.spread import MILD
 from jaxbiped.physics.trial import Disturbance, Tolerance, nominal_edge, play
 
 ROBOT = RobotModelConfig()
@@ -124,7 +125,7 @@ def test_all_primitives_at_the_papers_durations(name):
 @pytest.mark.parametrize("name", [*FAST])
 def test_the_mild_set_is_borne(name):
     table, rng = generate(FAST[name], ROBOT), np.random.default_rng(7)
-    draws = [Disturbance.mild(rng) for _ in range(8)]
+    draws = [MILD.draw(rng) for _ in range(8)]
     assert all(play(table, ROBOT, d).success(Tolerance()) for d in draws)
 
 
@@ -132,7 +133,7 @@ def test_the_mild_set_is_borne(name):
 @pytest.mark.parametrize("name", [*FAST])
 def test_the_mild_set_is_borne_in_128_draws(name):
     table, rng = generate(FAST[name], ROBOT), np.random.default_rng(8)
-    assert all(play(table, ROBOT, Disturbance.mild(rng)).success(Tolerance()) for _ in range(128))
+    assert all(play(table, ROBOT, MILD.draw(rng)).success(Tolerance()) for _ in range(128))
 
 
 @pytest.mark.parametrize("name", ["step up", "step down"])
