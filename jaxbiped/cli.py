@@ -23,6 +23,7 @@ COMMANDS = {
     "compare": ("compare", "CompareArgs", "compare strategies on random arenas, with statistics", True),
     "run": ("run", "RunArgs", "run one mission in a scene, with pictures", False),
     "plan": ("plan", "PlanArgs", "plan on a map that you have: Moving AI, ROS map_server, class grid", False),
+    "primitives": ("primitives", "PrimitivesArgs", "verify the motion primitives in simulation", False),
     "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
 }
 WRONG_INPUT = 2  # exit status
@@ -115,7 +116,7 @@ def is_rule(row: str) -> bool:
 
 def usage() -> str:
     """What `jaxbiped --help` prints."""
-    lines = "\n".join(f"  {name:<9} {summary}" for name, (_, _, summary, _) in COMMANDS.items())
+    lines = "\n".join(f"  {name:<10} {summary}" for name, (_, _, summary, _) in COMMANDS.items())
     return f"usage: jaxbiped COMMAND [options]\n\n{lines}\n\n`jaxbiped COMMAND --help` lists its options."
 
 

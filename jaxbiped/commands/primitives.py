@@ -1,0 +1,183 @@
+"""`jaxbiped primitives`: generate the motion primitives and verify them in simulation, under disturbances."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import math
+import shlex
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import polars as pl
+import pydantic
+from rich.console import Console
+
+from jaxbiped.config import Model, config_hash, load
+from jaxbiped.files import new_folder, refuse_existing, write_whole
+from jaxbiped.motion.biped import RobotModelConfig
+from jaxbiped.motion.catalogue import PAPER, Pace, catalogue
+from jaxbiped.motion.gait import PrimitiveTable, generate
+from jaxbiped.physics.spread import SETS
+from jaxbiped.physics.trial import Disturbance, Tolerance, passes_gate
+from jaxbiped.physics.verify import trials
+from jaxbiped.report.library import library, library_text
+from jaxbiped.report.primitives import markdown, save_windows, terminal
+from jaxbiped.report.video import save_primitive
+from jaxbiped.study import store
+
+Name = Literal[tuple(PAPER)]
+MM, DEG = 1e-3, math.radians(1.0)
+LIMITS = {  # disturbances one at a time: unit, and the values tried
+    "friction": (1.0, (0.1, 0.2, 0.3, 0.4, 0.6, 1.2)),
+    "mass": (1.0, (0.6, 0.7, 0.8, 0.9, 1.1, 1.2, 1.3, 1.4)),
+    "slope": (DEG, (-10, -7, -5, -4, -3, 3, 4, 5, 7, 10)),
+    "rise": (MM, (-20, -15, -12, -10, -8, -4, 4, 8, 10, 12, 15, 20)),
+    "edge": (MM, (-35, -30, -25, -20, -15, -8, 8, 15, 20, 25, 30, 35)),
+    "yaw": (DEG, (-20, -16, -12, -8, -4, 4, 8, 12, 16, 20)),
+    "lateral": (MM, (-60, -40, -20, 20, 40, 60)),
+    "clearance": (MM, (335, 340, 345, 350, 360)),
+}
+OF_EDGES, OF_GATES = ("rise", "edge", "yaw"), ("yaw", "lateral", "clearance")
+SERVO = (0.5, 1.0, 2.0)  # [deg] standard deviations of servo offsets
+WINDOW_EDGE, WINDOW_YAW = np.linspace(-0.035, 0.035, 15), np.linspace(-20, 20, 11)  # [m], [deg]
+
+
+class PrimitivesArgs(Model):
+    """Generate the motion primitives and verify them in simulation: undisturbed, on a mild and a hard set of
+    disturbances, and with each disturbance by itself. Write tables, the library that `--executor sampled` reads, and
+    videos.
+    """
+
+    pace: Pace = "paper"
+    """Table 2's durations, or as fast as servos and balance safely allow (as missions in simulation play them)."""
+    only: Annotated[tuple[Name, ...], pydantic.Field(min_length=1)] = tuple(PAPER)
+    """Which primitives."""
+    draws: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 128
+    """Trials of each set."""
+    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
+    """Of the disturbances: the first draws of a larger set are the same."""
+    backend: Literal["native", "mjx", "auto"] = "native"
+    """Who steps: MuJoCo on the CPU's threads, or MJX."""
+    device: Literal["cpu", "gpu", "tpu"] | None = None
+    """Where MJX steps; by default where JAX does."""
+    robot: Path | None = None
+    """Robot model, a TOML file such as configs/robots/enuvo_walk_model.toml; its values are the defaults."""
+    videos: bool = True
+    """Write a video of each primitive, played undisturbed."""
+    out: Path | None = None
+    """Folder to write, which must not exist. Default: results/primitives."""
+
+
+def main(args: PrimitivesArgs) -> int:
+    """Run the command.
+
+    Returns:
+      Exit status 0.
+
+    Raises:
+      InputError: a robot that cannot play a primitive (which joint or leg, and when), a device that is not there, a
+        folder that exists or cannot be written.
+    """
+    out = args.out or Path("results") / "primitives"
+    refuse_existing(out)
+    robot = load(RobotModelConfig, args.robot) if args.robot else RobotModelConfig()
+    tables = {name: generate(request, robot) for name, request in catalogue(args.pace).items() if name in args.only}
+    console, start = Console(), time.perf_counter()
+    frames = []
+    for name, table in tables.items():
+        begin = time.perf_counter()
+        frames.append(verify(name, table, robot, args))
+        spent = time.perf_counter() - begin
+        simulated = frames[-1]["simulated"].sum()
+        console.print(
+            f"{name}: {len(frames[-1])} trials, {simulated:.0f} s simulated in {spent:.0f} s", highlight=False
+        )
+    rows = pl.concat(frames)
+    command = shlex.join(["jaxbiped", *sys.argv[1:]])
+    with new_folder(out) as folder:
+        manifest = {
+            "command": command,
+            "config": args.model_dump(mode="json", exclude={"out"}),
+            "robot": robot.model_dump(mode="json"),
+            "config_hash": config_hash(args.model_copy(update={"out": None})),
+            "sets": {name: chosen.model_dump() for name, chosen in SETS.items()},
+            "tolerance": Tolerance().model_dump(),
+            "versions": store.versions(),
+            "wall_time": time.perf_counter() - start,
+        }
+        buffer = io.BytesIO()
+        rows.write_parquet(buffer)
+        write(folder / "trials.parquet", buffer.getvalue())
+        write(folder / "manifest.json", (json.dumps(manifest, indent=2) + "\n").encode())
+        made = library(rows, tables, robot, args.pace, args.seed, command)
+        write(folder / "library.toml", library_text(made).encode())
+        pictures = save_windows(folder / "windows.png", made)
+        if args.videos:
+            (folder / "videos").mkdir()
+            for name, table in tables.items():
+                save_primitive(folder / "videos" / f"{name}.gif", name, table, robot)
+        write(folder / "summary.md", markdown(rows, tables, manifest, pictures, args.videos).encode())
+    console.print(terminal(rows, tables))
+    console.print(f"{len(rows)} trials in {time.perf_counter() - start:.0f} s; written {out}", highlight=False)
+    return 0
+
+
+def write(path: Path, data: bytes) -> None:
+    """A whole file or none."""
+    write_whole(path, lambda file: file.write(data))
+
+
+def verify(name: str, table: PrimitiveTable, robot: RobotModelConfig, args: PrimitivesArgs) -> pl.DataFrame:
+    """All trials of one primitive, one row each."""
+    options = {} if args.backend == "native" else {"device": args.device}
+    parts = []
+    for record, sets in ((True, recorded(args)), (False, probes(table, args))):
+        names, disturbances = zip(*sets, strict=True)
+        result = trials(table, robot, disturbances, args.backend, record=record, **options)
+        parts.append(rows_of(name, names, disturbances, result))
+    return pl.concat(parts).with_columns(simulated=pl.lit(table.duration))
+
+
+def recorded(args: PrimitivesArgs) -> Iterator[tuple[str, Disturbance]]:
+    """What is measured wholly: undisturbed, and the sets."""
+    yield "nominal", Disturbance()
+    for name, chosen in SETS.items():
+        yield from ((name, disturbance) for disturbance in chosen.draws(args.draws, args.seed))
+
+
+def probes(table: PrimitiveTable, args: PrimitivesArgs) -> Iterator[tuple[str, Disturbance]]:
+    """Disturbances one at a time; and edges at all distances and yaws."""
+    request = table.request
+    for factor, (unit, values) in LIMITS.items():
+        applies = request.rise if factor in OF_EDGES and factor not in OF_GATES else True
+        if factor in OF_GATES:
+            applies = passes_gate(request) or (factor in OF_EDGES and request.rise)
+        if applies:
+            yield from ((factor, dataclasses.replace(Disturbance(), **{factor: value * unit})) for value in values)
+    rng = np.random.default_rng(args.seed)
+    for degrees in SERVO:
+        for _ in range(max(1, args.draws // 4)):
+            yield f"servo {degrees:g}", Disturbance(servo=tuple(rng.normal(0.0, degrees * DEG, 12).tolist()))
+    if request.rise:
+        for edge in WINDOW_EDGE:
+            yield from (("window", Disturbance(edge=float(edge), yaw=float(yaw) * DEG)) for yaw in WINDOW_YAW)
+
+
+def rows_of(name: str, sets, disturbances, result) -> pl.DataFrame:
+    """Trials as a table: what was disturbed, and what came of it."""
+    tolerance = Tolerance()
+    columns = {"primitive": [name] * len(sets), "set": list(sets)}
+    columns |= {
+        f.name: [getattr(d, f.name) for d in disturbances] for f in dataclasses.fields(Disturbance) if f.name != "servo"
+    }
+    columns["servo"] = [list(d.servo) for d in disturbances]
+    columns |= {f"error_{axis}": result.error[:, k] for k, axis in enumerate(("x", "y", "yaw"))}
+    columns |= {f.name: getattr(result, f.name) for f in dataclasses.fields(result) if f.name != "error"}
+    columns |= {word: getattr(result, word)(tolerance) for word in ("fell", "slipped", "success")}
+    return pl.DataFrame(columns)

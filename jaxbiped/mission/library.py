@@ -1,0 +1,145 @@
+"""What simulation measured of each primitive, as the executor `sampled` reads it."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pydantic
+from jaxtyping import Array, Float
+
+from jaxbiped.config import Model, load
+
+Count = Annotated[int, pydantic.Field(ge=0)]
+Three = tuple[float, float, float]
+DEFAULT = Path(__file__).with_name("library.toml")
+"""The library of the default robot, as `jaxbiped primitives` wrote it."""
+PLAYED = ("straight", "turn", "step_up", "step_down", "squat_straight", "sidestep")
+"""The primitives that displace the robot, in the order of the arrays of `Library`."""
+STEPS = ("step_up", "step_down")
+SMALLEST = 1e-12  # added to variances, so that what never varied has a square root
+
+
+class Window(Model):
+    """How a step over an edge ends by where the edge is. Every combination was tried, undisturbed otherwise."""
+
+    ahead: float
+    """[m] from the middle between the feet to the edge, where it should be."""
+    edge: Annotated[tuple[float, ...], pydantic.Field(min_length=2)]
+    """[m] that the edge is further away than where it should be, rising."""
+    yaw: Annotated[tuple[float, ...], pydantic.Field(min_length=2)]
+    """[rad] that it is turned anticlockwise from square, rising."""
+    stands: tuple[tuple[Annotated[float, pydantic.Field(ge=0.0, le=1.0)], ...], ...]
+    """Share of the trials that did not fall; a row an edge, a column a yaw."""
+
+    @pydantic.model_validator(mode="after")
+    def _shape(self):
+        if len(self.stands) != len(self.edge) or any(len(row) != len(self.yaw) for row in self.stands):
+            raise ValueError("stands must have a row for each edge and a column for each yaw")
+        if any(np.any(np.diff(axis) <= 0) for axis in (self.edge, self.yaw)):
+            raise ValueError("edge and yaw must rise")
+        return self
+
+
+class Entry(Model):
+    """One primitive on the mild set."""
+
+    request: Three
+    """(forward, left) [m] and turn [rad] asked for."""
+    rise: float
+    """[m]"""
+    duration: Annotated[float, pydantic.Field(gt=0.0)]
+    """[s]"""
+    trials: Annotated[int, pydantic.Field(gt=0)]
+    falls: Count
+    slips: Count
+    """Trials that ended upright, but not where they should."""
+    touches: Count
+    """Trials in which head or torso touched something."""
+    displacement: Three
+    """Mean of where it ended [m, m, rad], in the frame of the start, of the trials that did not fall."""
+    covariance: tuple[Three, Three, Three]
+    """Of the same."""
+    sway: Annotated[float, pydantic.Field(ge=0.0)]
+    """[m] furthest that the head's middle came to the side of the way."""
+    window: Window | None = None
+
+    @pydantic.model_validator(mode="after")
+    def _counts(self):
+        if max(self.falls + self.slips, self.touches) > self.trials:
+            raise ValueError("falls, slips and touches cannot be more than the trials")
+        if np.linalg.eigvalsh(np.array(self.covariance)).min() < -1e-9:
+            raise ValueError("covariance must have no negative eigenvalue")
+        return self
+
+
+class LibraryConfig(Model):
+    """What `jaxbiped primitives` measured."""
+
+    command: str
+    """The command line that wrote it."""
+    pace: str
+    seed: Count
+    primitives: dict[str, Entry]
+
+    @pydantic.model_validator(mode="after")
+    def _complete(self):
+        missing = [name for name in PLAYED if name not in self.primitives]
+        if missing:
+            raise ValueError(f"missions play {', '.join(missing)} too; verify all primitives")
+        for name in STEPS:
+            if self.primitives[name].window is None:
+                raise ValueError(f"{name} needs its window")
+        up, down = (self.primitives[name].window for name in STEPS)
+        if (up.edge, up.yaw) != (down.edge, down.yaw):
+            raise ValueError("the windows of step_up and step_down must have the same edge and yaw")
+        return self
+
+    def traced(self) -> Library:
+        """As arrays."""
+        entries = [self.primitives[name] for name in PLAYED]
+        windows = [self.primitives[name].window for name in STEPS]
+        covariances = np.array([entry.covariance for entry in entries]) + SMALLEST * np.eye(3)
+        single = lambda values: jnp.asarray(np.asarray(values), jnp.float32)  # noqa: E731
+        return Library(
+            request=single([entry.request for entry in entries]),
+            bias=single([np.subtract(entry.displacement, entry.request) for entry in entries]),
+            root=single(np.linalg.cholesky(covariances)),
+            falls=single([entry.falls / entry.trials for entry in entries]),
+            sway=single([entry.sway for entry in entries]),
+            ahead=single([window.ahead for window in windows]),
+            edge=single(windows[0].edge),
+            yaw=single(windows[0].yaw),
+            stands=single([window.stands for window in windows]),
+        )
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Library:
+    """`LibraryConfig`, traced; the first axis is that of `PLAYED`, of `stands` that of `STEPS`."""
+
+    request: Float[Array, "*B 6 3"]  # [m, m, rad]
+    bias: Float[Array, "*B 6 3"]  # mean displacement less the request
+    root: Float[Array, "*B 6 3 3"]  # Cholesky factor of its covariance
+    falls: Float[Array, "*B 6"]  # probability
+    sway: Float[Array, "*B 6"]  # [m]
+    ahead: Float[Array, "*B 2"]  # [m] where edges should be
+    edge: Float[Array, "*B E"]  # [m] of the windows, further away than that
+    yaw: Float[Array, "*B Y"]  # [rad]
+    stands: Float[Array, "*B 2 E Y"]  # probability
+
+
+@functools.lru_cache(maxsize=8)
+def load_library(path: Path | None = None) -> LibraryConfig:
+    """The library of a file that `jaxbiped primitives` wrote; the shipped one where None.
+
+    Raises:
+      InputError: no such file, or none of a library.
+    """
+    return load(LibraryConfig, path or DEFAULT)
