@@ -22,6 +22,7 @@ from jaxbiped.mission.state import Mind
 from jaxbiped.motion.approach import approach, foresight, next_crossing, remembered
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
+from jaxbiped.planning.rims import rim_costs
 from jaxbiped.sensing import edges
 from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.localisation import correct
@@ -66,10 +67,18 @@ def decide(
     goal_ij = jax.vmap(goal_cell, in_axes=(0, 0, 0, 0, None))(
         arena.goal_xy, settings.limits.goal_radius, plan_classes, rules, spec
     )
-    to_go = planning.field(plan_classes, plan_levels, costs, rules, goal_ij)
     heading = jax.vmap(nearest_direction)(mind.belief.pose.yaw)
-    length = max(stride(spec), foresight(spec)) if program.footing else stride(spec)
-    directions = planning.next_step(to_go.cost, plan_classes, plan_levels, costs, rules, ij, heading, length=length)
+    if program.footing:
+        moves = planning.edge_costs(plan_classes, plan_levels, costs, rules)
+        moves = moves + rim_costs(plan_classes, plan_levels, spec.pitch)
+        to_go = planning.cost_to_go(moves, goal_ij)
+        length = max(stride(spec), foresight(spec))
+        directions = planning.read_path(to_go, moves, ij, length, heading).directions
+    else:
+        to_go = planning.field(plan_classes, plan_levels, costs, rules, goal_ij)
+        directions = planning.next_step(
+            to_go.cost, plan_classes, plan_levels, costs, rules, ij, heading, length=stride(spec)
+        )
     mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, 0, 0, None))(
         mind, view, ij, goal_ij, directions, classes, levels, blind, settings, program
     )
@@ -168,8 +177,11 @@ def place_feet(
     seen = replace(seen, known=seen.known & crossing.edge.known)
     ahead = edges.fuse(known, seen)
     command = approach(
-        command, pose, ij, crossing, ahead, mind.behind, classes, levels, mind.look, settings.footing, spec
+        command, pose, ij, crossing, ahead, mind.ahead, mind.behind, classes, levels, mind.look, settings.footing, spec
     )
+    # An edge that the path has left is still there.
+    left = ~crossing.edge.known & mind.ahead.known & (mind.ahead.distance > 0)
+    ahead = jax.tree.map(lambda new, old: jnp.where(left, old, new), ahead, mind.ahead)
     return replace(mind, ahead=ahead), command
 
 

@@ -32,6 +32,7 @@ SIDESTEP = 0.015  # [m] a smaller one is not worth playing
 SURE_DISTANCE, SURE_ANGLE = 0.0028, 0.035  # [m, rad] standard deviations of an edge that is stepped over without a look
 SLACK = 0.01  # [m] kept between the feet and an edge that they do not step over
 LANES = np.array([0.0, 0.025, -0.025, 0.05, -0.05, 0.075, -0.075, 0.10, -0.10], np.float32)  # [m] to the side, tried
+SAME_PLACE, SAME_ANGLE = 0.08, 1.0  # [m, rad] that the map may have an edge off the place where it was measured
 STEADY = 0.09  # [rad] standard deviation of an edge's angle, above which it is measured again before a turn
 
 
@@ -85,7 +86,7 @@ def remembered(edge: Edge, crossing: Crossing) -> Edge:
     turned = wrap_angle(there.angle - edge.angle)
     # How far the path's crossing lies off the line.
     off = there.distance * jnp.cos(turned) - crossing.along * jnp.sin(turned) - edge.distance
-    same = (edge.rise == there.rise) & (jnp.abs(turned) < 0.6) & (jnp.abs(off) < 0.05)
+    same = (edge.rise == there.rise) & (jnp.abs(turned) < SAME_ANGLE) & (jnp.abs(off) < SAME_PLACE)
     return replace(edge, known=edge.known & there.known & same)
 
 
@@ -95,6 +96,7 @@ def approach(
     ij: Int[Array, "2"],
     crossing: Crossing,
     measured: Edge,
+    held: Edge,
     behind: Edge,
     classes: Int[Array, "H W"],
     levels: Int[Array, "H W"],
@@ -108,6 +110,7 @@ def approach(
       command: what `selection.select` wants; it is played as long as no edge is near.
       crossing: the next edge on the path, as the map has it.
       measured: the same edge, as it was measured; where it is not known, the map's is used.
+      held: the edge that it was about to cross when it decided last, which its path may have left.
       behind: the edge that the robot came over; it does not turn much before its feet are clear of it.
       looked: the robot has just looked down from here.
     """
@@ -153,7 +156,8 @@ def approach(
     )
     far_command = clear_of(behind, command, pose, classes, levels, footing, spec)
     far_command = short_of(crossing, s, angle, far_command)
-    return jax.tree.map(lambda a, b: jnp.where(near, a, b), near_command, far_command)
+    chosen = jax.tree.map(lambda a, b: jnp.where(near, a, b), near_command, far_command)
+    return back_off(held, chosen, footing)
 
 
 def turning_room(angle: Float[Array, ""], up: Bool[Array, ""], footing: Footing) -> Float[Array, ""]:
@@ -164,7 +168,7 @@ def turning_room(angle: Float[Array, ""], up: Bool[Array, ""], footing: Footing)
     cos, sin = jnp.abs(jnp.cos(angle)), jnp.abs(jnp.sin(angle))
     toes = footing.foot_length / 2 * cos + footing.foot_outside * sin + SLACK
     ankles = footing.hip_offset * sin + SLACK
-    return jnp.where(up, jnp.minimum(toes, footing.before_up + 0.02), ankles)
+    return jnp.where(up, toes, ankles)
 
 
 def best_lane(
@@ -192,8 +196,8 @@ def best_lane(
         return classes[i, j], levels[i, j].astype(jnp.int32)
 
     bad = jnp.zeros(along.shape)
-    for side in (-1.0, 0.0, 1.0):
-        v = along + side * footing.hip_offset * 1.4
+    for side in (-2.0, -1.4, 0.0, 1.4, 2.0):
+        v = along + side * footing.hip_offset
         for points, level in ((before, here), (after, here + edge.rise)):
             for k in range(2):
                 _, ground = cells(points[k] + 0 * v, v)
@@ -235,9 +239,29 @@ def clear_of(
     )
 
 
+def back_off(held: Edge, command: Command, footing: Footing) -> Command:
+    """The command, or some steps backward where it turns too close to an edge ahead that it does not cross."""
+    turns = (jnp.abs(command.turn) > LARGE) & (command.primitive != Primitive.LOOK)
+    ends = wrap_angle(held.angle - command.turn)
+    room = jnp.maximum(turning_room(ends, held.rise > 0, footing), turning_room(held.angle, held.rise > 0, footing))
+    short = jnp.clip((room - held.distance) / jnp.maximum(jnp.cos(held.angle), 0.5), 0.0, 0.06)
+    close = held.known & (held.distance > 0) & (jnp.abs(held.angle) < 0.8) & (short > footing.tolerance)
+    leave = close & turns
+    return replace(
+        command,
+        turn=jnp.where(leave, 0.0, command.turn),
+        primitive=jnp.where(leave, Primitive.STRAIGHT_FORWARD, command.primitive).astype(jnp.int32),
+        length=jnp.where(leave, -short, command.length),
+        rise=jnp.where(leave, 0, command.rise).astype(jnp.int32),
+        squat=command.squat & ~leave,
+    )
+
+
 def short_of(crossing: Crossing, s: Float[Array, ""], angle: Float[Array, ""], command: Command) -> Command:
     """The command, shortened so that a walk askew ends well before the next edge."""
     towards = jnp.cos(wrap_angle(angle - command.turn))
     most = jnp.where(crossing.edge.known & (towards > 0.1), (s - 0.10) / jnp.maximum(towards, 0.1), jnp.inf)
     straight = command.primitive == Primitive.STRAIGHT_FORWARD
-    return replace(command, length=jnp.where(straight, jnp.clip(command.length, 0.0, most), command.length))
+    return replace(
+        command, length=jnp.where(straight, jnp.minimum(command.length, jnp.maximum(most, 0.0)), command.length)
+    )

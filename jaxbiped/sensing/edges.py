@@ -26,7 +26,7 @@ WIDTHS = (0.015, 0.015, 0.010, 0.010, 0.007, 0.005, 0.004, 0.004)
 SOFT = 0.25  # share of the rise, at both ends, in which a height counts as plain ground
 STRAY = 0.4  # share of the rise beyond it, in which a height counts at all
 LEAST = 8.0  # rays wanted on each side of the line
-MOST_WRONG = 0.15  # share of the rays that may lie on the wrong side
+MOST_WRONG = 0.08  # share of the rays that may lie on the wrong side
 CLEAR = 0.012  # [m] from the line on, a ray on the wrong side is wrong
 # What a view is off by itself: rays are about 11 mm apart on the ground, and a row of them that runs along the edge
 # tells no more than that it lies between this row and the next.
