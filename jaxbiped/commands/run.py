@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -15,7 +16,7 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.config import Model, config_hash
 from jaxbiped.files import new_folder, refuse_existing
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.mission.stepped import Mission, run_logged
 from jaxbiped.mission.strategies import STRATEGIES
 from jaxbiped.report.animation import save_gif
@@ -54,12 +55,17 @@ def main(args: RunArgs) -> int:
     static = program(args.mission, tuple(round(float(v), 6) for v in arena.size_xy))
     print(f"{name}, {args.strategy}, sensor {args.mission.sensor}, executor {args.mission.executor}, seed {args.seed}")
     print("   time   turn   ahead  primitive")
-    mission = run_logged(
+    play = run_logged
+    if args.mission.executor in SIMULATED:
+        from jaxbiped.mission.walking import walk_logged
+
+        play = partial(walk_logged, config=args.mission.walk)
+    mission = play(
         arena,
         args.mission.settings(args.strategy),
         from_key(jax.random.key(args.seed)),
         static,
-        lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
+        on_decision=lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
     )
     print(sentence(mission))
     with new_folder(out) as folder:

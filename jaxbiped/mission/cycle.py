@@ -14,7 +14,7 @@ from jaxbiped.mission.decision import Thought, climbed, decide, walked
 from jaxbiped.mission.executors import EXECUTORS, Execution
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Mind, World
+from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import landmarks, oracle, raycast
 from jaxbiped.sensing.hashing import fold
@@ -35,12 +35,7 @@ def cycle(
 
     Consumes channels SENSE and ODOMETRY of each mission's seed, counted by its decisions.
     """
-    sensed = jax.vmap(sense, in_axes=(0, 0, 0, 0, None))(world, mind, arena, settings, program)
-    # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
-    view, sightings = jax.lax.optimization_barrier(sensed)
-    if program.sensor == "oracle":
-        mind = replace(mind, belief=replace(mind.belief, pose=on_level(world.pose, program)))
-    thinking, command, verdict, thought = decide(mind, view, sightings, arena, settings, program)
+    view, thinking, command, verdict, thought = think(world, mind, arena, settings, program)
     executed = jax.vmap(EXECUTORS[program.executor])(arena, world, command, settings)
     after, moved = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, thinking, command, verdict, executed, arena, settings, program
@@ -50,8 +45,29 @@ def cycle(
     return after, moved, view, command, thought
 
 
-def sense(world: World, mind: Mind, arena: Arena, settings: Settings, program: Program) -> tuple[View, Sightings]:
-    """What one robot measures from where it really stands."""
+def think(
+    world: World, mind: Mind, arena: Arena, settings: Settings, program: Program, carriage: Carriage | None = None
+) -> tuple[View, Mind, Command, Int[Array, "B"], Thought]:
+    """Sense and decide, for a batch: the view, and what `decide` returns. Consumes channel SENSE.
+
+    Args:
+      carriage: [B] how each robot really holds its body; None: upright where it stands, but for a tilt that the
+        sensor draws.
+    """
+    sensed = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, arena, settings, program, carriage)
+    # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
+    view, sightings = jax.lax.optimization_barrier(sensed)
+    if program.sensor == "oracle":
+        mind = replace(mind, belief=replace(mind.belief, pose=on_level(world.pose, program)))
+    return view, *decide(mind, view, sightings, arena, settings, program)
+
+
+def sense(
+    world: World, mind: Mind, arena: Arena, settings: Settings, program: Program, carriage: Carriage | None
+) -> tuple[View, Sightings]:
+    """What one robot measures from where it really stands, and with its body as it really holds it."""
+    pose = world.pose if carriage is None else carriage.pose
+    attitude = None if carriage is None else (carriage.roll, carriage.pitch)
     seed = fold(world.seed, SENSE, world.decisions)
     if program.sensor == "oracle":
         area = (program.spec.size_x, program.spec.size_y)
@@ -60,10 +76,10 @@ def sense(world: World, mind: Mind, arena: Arena, settings: Settings, program: P
         )
     else:
         view = raycast.measure(
-            arena, world.pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat
+            arena, pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat, attitude
         )
     return view, landmarks.sight(
-        arena, world.pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
+        arena, pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
     )
 
 

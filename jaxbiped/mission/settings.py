@@ -12,6 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.config import Model
 from jaxbiped.mapping import Body, GridSpec, MapConfig, MapParams
+from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.strategies import Strategy, strategy
 from jaxbiped.motion.primitives import DurationConfig, Durations
 from jaxbiped.motion.robot import Footing, RobotConfig
@@ -24,6 +25,7 @@ from jaxbiped.sensing.presets import PRESETS
 
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
+SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 
 # Bounded so that sums of costs along a path keep their differences in single precision.
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
@@ -65,7 +67,8 @@ class MissionConfig(Model):
     sensor: Literal["raycast", "oracle"] = "raycast"
     preset: Literal["ideal", "rendered", "real"] = "rendered"
     """How well the camera measures: the default of each number of `stereo` and `landmarks`."""
-    executor: Literal["kinematic"] = "kinematic"
+    executor: Literal["kinematic", "native", "mjx"] = "kinematic"
+    """`native` and `mjx`: simulated bipeds, in MuJoCo's own batch or in MJX."""
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False
@@ -79,6 +82,7 @@ class MissionConfig(Model):
     odometry: OdometryConfig = OdometryConfig()
     mapping: MapConfig = MapConfig()
     limits: LimitConfig = LimitConfig()
+    walk: WalkConfig = WalkConfig()
 
     @pydantic.model_validator(mode="before")
     @classmethod

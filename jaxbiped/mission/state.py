@@ -35,6 +35,19 @@ class World:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
+class Carriage:
+    """How a robot really holds its body: the robot frame that its cameras are fixed to.
+
+    In the home posture it is the frame of the feet; else it is that frame moved and tilted as the torso is.
+    """
+
+    pose: Pose  # its origin and yaw
+    roll: Float[Array, "*B"]  # [rad] to the right
+    pitch: Float[Array, "*B"]  # [rad] forward and down
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class Mind:
     """The robot's side. The stance is known to both."""
 

@@ -19,8 +19,8 @@ from jaxbiped.mission.decision import Thought, nearest_direction
 from jaxbiped.mission.log import Mark, MissionLog, Outline
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import World, start
-from jaxbiped.motion.primitives import Primitive
+from jaxbiped.mission.state import Mind, World, start
+from jaxbiped.motion.primitives import Command, Primitive
 
 NAMES = {
     Primitive.NONE: "Stay",
@@ -67,47 +67,78 @@ def run_logged(
     """Run one mission (no batch axis) as the compiled driver would, and keep what it saw and thought."""
     batch = jax.tree.map(lambda leaf: leaf[None], (arena, settings))
     world, mind = jax.tree.map(lambda leaf: leaf[None], start(arena, settings, seed, program.spec))
-    moments, played = [], []
-    action = "Start"
+    recorder = Recorder(settings, program, on_decision)
     while world.code[0] == Code.RUNNING:
         before = world
         world, mind, _, command, thought = turn_once(world, mind, *batch, program)
-        moments.append(moment(before, thought, settings, program, action))
+        recorder.decided(0, before, command, thought)
+        recorder.concluded(0, world, mind)
+    return recorder.mission(arena, world)
+
+
+class Recorder:
+    """Keeps what one mission saw and thought; worlds, minds and so on have a leading axis of 1."""
+
+    def __init__(self, settings: Settings, program: Program, on_decision: Callable[[Played], None]):
+        self.settings, self.program, self.on_decision = settings, program, on_decision
+        self.moments: list[dict] = []
+        self.played: list[Played] = []
+        self.action = "Start"
+        self.end: World | None = None
+
+    def decided(self, _: int, world: World, command: Command, thought: Thought) -> None:
+        """One decision, before it is carried out."""
+        self.moments.append(moment(world, thought, self.settings, self.program, self.action))
+        self.command = command
+
+    def concluded(self, _: int, world: World, mind: Mind) -> None:
+        """What came of it."""
+        command = self.command
         record = Played(
             name=NAMES[Primitive(int(command.primitive[0]))],
             turn=float(command.turn[0]),
             length=float(command.length[0]),
             time=float(world.time[0]),
         )
-        played.append(record)
-        on_decision(record)
-        action = record.name if record.length or not record.turn else "Turn-direction"
-    if moments:
-        last = dict(moments[-1])
-        here, time = pose_of(world), float(world.time[0])
-        last |= {"true_xyyaw": here, "estimated_xyyaw": mind_pose(mind), "time": time, "action": action}
-        last["plan"] = np.zeros((0, 2))
-        moments.append(last)
-    else:
-        moments.append(nothing(world, program))
-    code = Code(int(world.code[0]))
-    log = MissionLog(
-        classes=np.stack([m["classes"] for m in moments]),
-        levels=np.stack([m["levels"] for m in moments]),
-        true_xyyaw=np.stack([m["true_xyyaw"] for m in moments]),
-        estimated_xyyaw=np.stack([m["estimated_xyyaw"] for m in moments]),
-        plan=tuple(m["plan"] for m in moments),
-        time=np.array([m["time"] for m in moments]),
-        action=tuple(m["action"] for m in moments),
-        pitch=program.spec.pitch,
-        origin_xy=np.zeros(2),
-        size_xy=np.asarray(arena.size_xy, float),
-        goal_xy=np.asarray(arena.goal_xy, float),
-        outlines=outlines(arena),
-        landmarks=marks(arena),
-        outcome=code.label,
-    )
-    return Mission(code, float(world.distance[0]), float(world.time[0]), int(world.measurements[0]), tuple(played), log)
+        self.played.append(record)
+        self.on_decision(record)
+        self.action = record.name if record.length or not record.turn else "Turn-direction"
+        self.end, self.mind = world, mind
+
+    def mission(self, arena: Arena, world: World) -> Mission:
+        """The whole of it.
+
+        Args:
+          world: as it began, for a mission that was over by then.
+        """
+        moments, world = list(self.moments), self.end or world
+        if moments:
+            last = dict(moments[-1])
+            here, time = pose_of(world), float(world.time[0])
+            last |= {"true_xyyaw": here, "estimated_xyyaw": mind_pose(self.mind), "time": time, "action": self.action}
+            last["plan"] = np.zeros((0, 2))
+            moments.append(last)
+        else:
+            moments.append(nothing(world, self.program))
+        code = Code(int(world.code[0]))
+        log = MissionLog(
+            classes=np.stack([m["classes"] for m in moments]),
+            levels=np.stack([m["levels"] for m in moments]),
+            true_xyyaw=np.stack([m["true_xyyaw"] for m in moments]),
+            estimated_xyyaw=np.stack([m["estimated_xyyaw"] for m in moments]),
+            plan=tuple(m["plan"] for m in moments),
+            time=np.array([m["time"] for m in moments]),
+            action=tuple(m["action"] for m in moments),
+            pitch=self.program.spec.pitch,
+            origin_xy=np.zeros(2),
+            size_xy=np.asarray(arena.size_xy, float),
+            goal_xy=np.asarray(arena.goal_xy, float),
+            outlines=outlines(arena),
+            landmarks=marks(arena),
+            outcome=code.label,
+        )
+        played = tuple(self.played)
+        return Mission(code, float(world.distance[0]), float(world.time[0]), int(world.measurements[0]), played, log)
 
 
 def moment(world: World, thought: Thought, settings: Settings, program: Program, action: str) -> dict:

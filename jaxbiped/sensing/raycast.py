@@ -24,16 +24,18 @@ def measure(
     seed: UInt32[Array, ""],
     look: Bool[Array, ""] | bool = False,
     squat: Bool[Array, ""] | bool = False,
+    attitude: tuple[Float[Array, ""], Float[Array, ""]] | None = None,
 ) -> View:
     """One measurement in one arena from the true `pose` (z: height of the supporting surface).
 
-    The robot's true attitude is off by a roll and a pitch that the view's seed draws; points are reprojected as if it
-    were upright (`View`). `look` tilts the camera to the feet, `squat` lowers it. Rays that measured nothing, or a
+    The robot's true attitude is off by a roll and a pitch [rad]: `attitude` where it is known, as of a simulated
+    robot, else drawn by the view's seed. Points are reprojected as if it were upright (`View`). `look` tilts the camera to the feet, `squat` lowers it. Rays that measured nothing, or a
     range beyond `noise.max_range`, have weight 0 and lie at the origin; so do all when the pose is not finite.
     """
     at = mount(camera, look, squat)
     textured = arena.boxes.contrast >= noise.min_contrast, arena.floor_contrast >= noise.min_contrast
-    keys = cast(arena, pose, camera, at, image, *stereo.attitude_error(noise, seed), *textured)
+    roll, pitch = stereo.attitude_error(noise, seed) if attitude is None else attitude
+    keys = cast(arena, pose, camera, at, image, roll, pitch, *textured)
     disparity = nearness(keys) * (camera.focal * camera.baseline)
     disparity = stereo.match(disparity, marked(keys)[1:-1, 1:-1], camera, image, noise, seed)
     return reproject(disparity, camera, at, image, noise.max_range)
