@@ -25,8 +25,9 @@ HALF_WIDTH = 0.10  # [m] half of the edge's piece that is measured: what the two
 WIDTHS = (0.015, 0.015, 0.010, 0.010, 0.007, 0.005, 0.004, 0.004)
 SOFT = 0.25  # share of the rise, at both ends, in which a height counts as plain ground
 STRAY = 0.4  # share of the rise beyond it, in which a height counts at all
+TRIMMED_FROM = 4  # round from which on rays that lie clearly on the wrong side do not count, as those beside a corner
 LEAST = 8.0  # rays wanted on each side of the line
-MOST_WRONG = 0.08  # share of the rays that may lie on the wrong side
+MOST_WRONG = 0.15  # share of the rays that may lie on the wrong side
 CLEAR = 0.012  # [m] from the line on, a ray on the wrong side is wrong
 # What a view is off by itself: rays are about 11 mm apart on the ground, and a row of them that runs along the edge
 # tells no more than that it lies between this row and the next.
@@ -128,8 +129,10 @@ def measure(
 
     distance, angle = about.distance, about.angle
     prior_d, prior_a = PRIOR_DISTANCE**-2, PRIOR_ANGLE**-2
-    for width in WIDTHS:
+    for k, width in enumerate(WIDTHS):
         off, along, weight = residuals(distance, angle)
+        if k >= TRIMMED_FROM:
+            weight = jnp.where((jnp.abs(off) > CLEAR) & (jnp.abs(label - (off > 0)) > 0.5), 0.0, weight)
         beyond = 0.5 + 0.5 * jnp.tanh(off / (2 * width))
         pull = weight * (beyond - label) / width
         stiff = weight * beyond * (1 - beyond) / width**2

@@ -17,7 +17,7 @@ from jaxbiped.mission.executors import EXECUTORS, kinematic
 from jaxbiped.motion.primitives import Primitive
 
 FINE = np.arange(-0.06, 0.2401, 0.001, dtype=np.float32)  # [m] ahead of the robot, where edges are looked for
-SIDE = 0.06  # [m] to both sides, where they are looked for as well
+SIDE = 0.045  # [m] to both sides, before the middle of each foot, where they are looked for as well
 TOLERANCE = 0.012  # [m] that an edge may lie off its place: 8 mm are fine for a simulated biped, 25 mm fail
 ASKEW = np.deg2rad(8.0)  # that it may be off square
 TOES = np.array([-0.05, 0.0, 0.05], np.float32)  # [m] where feet are looked at, along and across
