@@ -119,8 +119,12 @@ class Backend(Protocol):
         """
         ...
 
-    def advance(self, controls: Any, hold: int = 1) -> State:
-        """Step all simulations S * hold times; `controls` is [B, S, nu], finite, each held for `hold` steps."""
+    def advance(self, controls: Any, hold: int = 1, mask: Any = None) -> State:
+        """Step the simulations of `mask` [B] (all where None) S * hold times; the others stay as they are.
+
+        `controls` is [B, S, nu], finite, each held for `hold` steps. What is masked costs nothing in `native`, and as
+        much as the rest in `mjx`.
+        """
         ...
 
     def compile(self) -> float:

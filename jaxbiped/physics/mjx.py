@@ -67,6 +67,7 @@ class Mjx:
         self.traces = 0  # of the one function that is dear to compile
         self.block = jax.jit(self.traced_block)
         self.start = jax.jit(self.traced_start)
+        self.keep = jax.jit(self.traced_keep)
         with jax.default_device(self.engine.device):
             self.data = jax.jit(jax.vmap(self.engine.at))(np.tile(self.model.qpos0, (self.batch_size, 1)))
             self.warned = self.unwarned()
@@ -134,18 +135,22 @@ class Mjx:
         self.living.write(values, np.flatnonzero(chosen))
         self.overrides = None
 
-    def advance(self, controls: Any, hold: int = 1) -> State:
+    def advance(self, controls: Any, hold: int = 1, mask: Any = None) -> State:
         """See `Backend.advance`."""
         table = inputs.controls(controls, self.batch_size, self.model)
         steps, hold = inputs.every(table.shape[1], None, hold)
-        depth = self.untouched()
+        depth, data, warned = self.untouched(), self.data, self.warned
         if self.overrides is None:
             self.overrides = self.overridden(self.living)
         for _, count, block in self.blocks(table, hold):
             self.data, self.warned, depth, _ = self.block(
                 self.engine.model, self.overrides, self.data, self.warned, depth, block, np.int32(count)
             )
-        self.steps = self.steps + steps
+        chosen = inputs.chosen(mask, self.batch_size)
+        if not chosen.all():
+            others = (self.warned, warned), (depth, self.untouched())
+            self.data, self.warned, depth = self.keep(chosen, self.data, data, *others)
+        self.steps = self.steps + steps * chosen
         return self.state(depth)
 
     def compile(self) -> float:
@@ -245,6 +250,15 @@ class Mjx:
             return jnp.where(mask.reshape(-1, *[1] * (old.ndim - 1)), jnp.asarray(value, old.dtype), old)
 
         return data.replace(**{name: choose(name, value) for name, value in fresh.items()})
+
+    def traced_keep(self, mask: Array, new: Any, old: Any, *others: tuple[Array, Array]) -> tuple:
+        """The data of a batch where only the simulations of a mask have gone on; and arrays [B, ...] likewise."""
+
+        def choose(a: Array, b: Array) -> Array:
+            return jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b)
+
+        data = new.replace(**{name: choose(getattr(new, name), getattr(old, name)) for name in self.engine.initial()})
+        return data, *(choose(a, b) for a, b in others)
 
     def state(self, depth: Float[Array, "B W"]) -> State:
         """A copy of the living batch as it is."""

@@ -68,7 +68,7 @@ class Native:
         pool = self.scratch
         pool.fields.only(values)
         pool.reset(np.ones(self.batch_size, bool), *start)
-        times, records, depth = pool.run(table, hold, every)
+        times, records, depth = pool.run(table, hold, every, np.ones(self.batch_size, bool))
         nq, ns = 1 + self.model.nq, 1 + self.model.nq + self.model.nv
         return Rollout(
             time=times,
@@ -93,11 +93,11 @@ class Native:
         values = inputs.fields(fields, self.batch_size, self.model, chosen)
         self.living.fields.write(values, np.flatnonzero(chosen))
 
-    def advance(self, controls: Any, hold: int = 1) -> State:
+    def advance(self, controls: Any, hold: int = 1, mask: Any = None) -> State:
         """See `Backend.advance`."""
         table = inputs.controls(controls, self.batch_size, self.model)
         steps, hold = inputs.every(table.shape[1], None, hold)
-        _, _, depth = self.living.run(table, hold, steps)
+        _, _, depth = self.living.run(table, hold, steps, inputs.chosen(mask, self.batch_size))
         return self.living.state(depth)
 
     def compile(self) -> float:
@@ -149,9 +149,13 @@ class Pool:
         self.errors[mask], self.bad[mask] = 0, 0
 
     def run(
-        self, controls: Float64[np.ndarray, "B T nu"], hold: int, every: int
+        self, controls: Float64[np.ndarray, "B T nu"], hold: int, every: int, mask: Bool[np.ndarray, "B"]
     ) -> tuple[Float64[np.ndarray, "R"], Float64[np.ndarray, "B R row"], Float64[np.ndarray, "B W"]]:
-        """Play a table: record times, records (time, qpos, qvel, own sensors), deepest contacts of the watches."""
+        """Play a table in the simulations of a mask.
+
+        Returns:
+          Record times, records (time, qpos, qvel, own sensors), and deepest contacts of the watches.
+        """
         model, count, steps = self.model, len(controls), controls.shape[1] * hold
         width = 1 + model.nq + model.nv
         out = np.full((count, steps // every, width + self.watched.own), np.nan)
@@ -159,11 +163,10 @@ class Pool:
         chunk = max(1, CHUNK // (count * (width + model.nsensordata)))
         for begin in range(0, steps, chunk):
             end = min(begin + chunk, steps)
-            valid = self.valid
-            ids = np.flatnonzero(valid)
+            ids = np.flatnonzero(self.valid & mask)
             if not len(ids):
                 break
-            table = controls if valid.all() else controls[ids]
+            table = controls if len(ids) == count else controls[ids]
             table = table[:, begin:end] if hold == 1 else table[:, np.arange(begin, end) // hold]
             states, sensors, good = self.chunk(ids, table)
             keep = slice(-(begin + 1) % every, None, every)

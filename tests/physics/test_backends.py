@@ -65,6 +65,24 @@ def test_simulations_are_at_different_phases(backend):
     np.testing.assert_array_equal(state.qpos, np.where(late[:, None], rolled.qpos[:, 39], rolled.qpos[:, 59]))
 
 
+def test_who_is_not_of_the_mask_stays_as_it_is(backend):
+    controls, qpos, qvel, fields = hops(backend.model, 60)
+    backend.set_fields(fields)
+    backend.reset(qpos=qpos, qvel=qvel)
+    before = backend.advance(controls[:, :20])
+    some = np.array([True, False] * (BATCH // 2))
+    state = backend.advance(controls[:, 20:40], mask=some)
+    np.testing.assert_allclose(state.time, np.where(some, 2, 1) * before.time)
+    for name in ("qpos", "qvel"):
+        np.testing.assert_array_equal(getattr(state, name)[~some], getattr(before, name)[~some])
+    assert not state.touched[~some].any() and not state.depth[~some].any()
+    backend.advance(controls[:, 20:40], mask=~some)
+    after = backend.advance(controls[:, 40:])
+    rolled = backend.rollout(controls, qpos, qvel, fields)
+    np.testing.assert_array_equal(after.qpos, rolled.qpos[:, -1])
+    np.testing.assert_array_equal(backend.advance(controls, mask=np.zeros(BATCH, bool)).qpos, after.qpos)
+
+
 def test_rollouts_leave_the_living_batch_alone(backend):
     controls, qpos, qvel, fields = hops(backend.model, 40)
     backend.reset(qpos=qpos, qvel=qvel)
