@@ -126,12 +126,12 @@ class Stage:
         quaternion[:] = math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)
         self.tops[s, k] = top
 
-    def play(self, controls: Float[np.ndarray, "S T 12"]) -> None:
-        """Step all robots, and note who falls or collides."""
+    def play(self, controls: Float64[np.ndarray, "S T 12"], mask: Bool[np.ndarray, "S"] | None = None) -> None:
+        """Step the robots of a mask (all where None), and note who falls or collides."""
         if self.changed.any():
             self.backend.set_fields(self.fields, self.changed)
             self.changed[:] = False
-        self.state = state = self.backend.advance(controls)
+        self.state = state = self.backend.advance(controls, mask=mask)
         _, x, y, _ = state.qpos[:, 3:7].T
         upright = 1 - 2 * (x * x + y * y)
         tall = np.any(state.touched[:, 1:] & (self.tops > self.reach[:, None]), axis=1)

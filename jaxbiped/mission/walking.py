@@ -125,12 +125,12 @@ class Walkers:
         return self.result
 
     def play(self) -> None:
-        """Step all robots by a slice."""
+        """Step all robots that have a job by a slice."""
         ahead = [
             tape[np.minimum(np.arange(place, place + SLICE), len(tape) - 1)]
             for tape, place in zip(self.tapes, self.place, strict=True)
         ]
-        self.stage.play(np.stack(ahead))
+        self.stage.play(np.stack(ahead), self.job < self.count)
         self.place += SLICE
 
     def turn(self, ids: Int[np.ndarray, "n"]) -> None:

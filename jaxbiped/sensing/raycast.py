@@ -29,8 +29,9 @@ def measure(
     """One measurement in one arena from the true `pose` (z: height of the supporting surface).
 
     The robot's true attitude is off by a roll and a pitch [rad]: `attitude` where it is known, as of a simulated
-    robot, else drawn by the view's seed. Points are reprojected as if it were upright (`View`). `look` tilts the camera to the feet, `squat` lowers it. Rays that measured nothing, or a
-    range beyond `noise.max_range`, have weight 0 and lie at the origin; so do all when the pose is not finite.
+    robot, else drawn by the view's seed. Points are reprojected as if it were upright (`View`). `look` tilts the
+    camera to the feet, `squat` lowers it. Rays that measured nothing, or a range beyond `noise.max_range`, have weight
+    0 and lie at the origin; so do all when the pose is not finite.
     """
     at = mount(camera, look, squat)
     textured = arena.boxes.contrast >= noise.min_contrast, arena.floor_contrast >= noise.min_contrast

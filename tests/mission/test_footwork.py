@@ -93,5 +93,5 @@ def test_fast_is_never_slower_than_the_paper():
 
 
 def test_what_no_robot_can_do_is_an_input_error():
-    with pytest.raises(InputError, match="step up.*leg is|leaves its"):
+    with pytest.raises(InputError, match=r"step up.*leg is|leaves its"):
         targets(ask.step(0.10, 0.30), ROBOT)
