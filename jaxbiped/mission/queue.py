@@ -84,7 +84,7 @@ def compile_queue(arenas: Arena, settings: Settings, jobs: Jobs, program: Progra
         filled = fill.lower(arenas, settings, jobs, program, slots)
         queue = jax.eval_shape(partial(fill, program=program, slots=slots), arenas, settings, jobs)
         turned = segment.lower(queue, arenas, settings, jobs, program)
-        COMPILED[signature] = filled.compile(), turned.compile()
+        COMPILED[signature] = filled.compile(), wide(turned)
     first, further = COMPILED[signature]
 
     def work(arenas: Arena, settings: Settings, jobs: Jobs, on_progress: Callable[[int], None]) -> Result:
@@ -100,6 +100,14 @@ def compile_queue(arenas: Arena, settings: Settings, jobs: Jobs, program: Progra
 
 
 COMPILED: dict = {}
+
+
+def wide(lowered: jax.stages.Lowered) -> jax.stages.Compiled:
+    """Compiled with vectors of 512 bits where a CPU has them; the default of half of that is a few per cent slower."""
+    try:
+        return lowered.compile(compiler_options={"xla_cpu_prefer_vector_width": 512})
+    except jax.errors.JaxRuntimeError:  # a compiler that has no such option
+        return lowered.compile()
 
 
 def shapes(tree) -> list:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -14,15 +14,14 @@ from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.errors import InputError
-from jaxbiped.planning import kernels, worklist
+from jaxbiped.planning import compiled, wavefront
 from jaxbiped.planning.costs import Costs, Rules, half_edges
 
-# Arenas relaxed together, at least and at most, on small and on large grids: what fits the cache, and few enough that
-# a slow map holds few others. At least: compilers unroll short loops over the batch and then leave them unvectorised,
-# so that a batch is made up with copies, unless there are so FEW that the copies cost more.
-LANES, LANES_LARGE, FEW = (80, 128), (32, 32), 16
-WIDE = {"xla_cpu_prefer_vector_width": 512}  # bits; the default is half of that
+METHODS = ("wavefront", *compiled.METHODS)
+CHUNK, CHUNK_LARGE = 32, 16  # arenas settled together, of small and of large grids: what fits the cache
+PIECES = 4  # for each core, so that a slow piece does not leave the other cores idle
 LARGE = 1200  # cells; larger grids are summed in float64 (see `_solve`)
+HUGE, FEW = 1 << 17, 4  # cells from which on, and large grids at once below which, cells are settled one by one
 
 
 @jax.tree_util.register_dataclass
@@ -31,7 +30,7 @@ class CostToGo:
     """Least cost from each cell to the goal."""
 
     cost: Float[Array, "B H W"]  # inf: no way, or not converged
-    iterations: Int[Array, "B"]  # rounds of relaxation until nothing changed
+    iterations: Int[Array, "B"]  # rounds of relaxation until nothing changed; 1 with "dijkstra"
     converged: Bool[Array, "B"]  # False: costs that are NaN or negative
 
 
@@ -43,9 +42,10 @@ def cost_to_go(
     Args:
       edge_costs: non-negative; zero and inf are allowed. An arena with a NaN or a negative one does not converge.
       goal_ij: row and column; a goal outside the grid is reached from nowhere.
-      method: "line_sweep", "wavefront", or "auto" (by platform).
+      method: "wavefront" (any device), "line_sweep" or "dijkstra" (CPU), or "auto": line sweeps on a CPU, Dijkstra
+        there for huge grids and for few large ones, the wavefront elsewhere.
     """
-    return _on_all_cores(_cost_to_go, (edge_costs, goal_ij), _method(method))
+    return _on_all_cores(_cost_to_go, (edge_costs, goal_ij), _method(method, edge_costs))
 
 
 def field(
@@ -64,82 +64,70 @@ def field(
     if goal_ij is None:
         raise InputError("must be given", field="goal_ij")
     each = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, classes.shape[:1]), (costs or Costs(), rules or Rules()))
-    return _on_all_cores(_field, (classes, levels, each, goal_ij), _method(method))
+    return _on_all_cores(_field, (classes, levels, each, goal_ij), _method(method, classes))
 
 
-@partial(jax.jit, static_argnums=(1, 2))
-def _cost_to_go(inputs, method: str, alone: bool) -> CostToGo:
+@partial(jax.jit, static_argnums=1)
+def _cost_to_go(inputs, method: str) -> CostToGo:
     def chunk(edges, goal):
         valid = (edges >= 0).all((1, 2, 3))  # False for NaN as well
         edges = jnp.where(valid[:, None, None, None], edges, jnp.inf)
         last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
-        return _solve(tuple(last), goal, method, valid, alone)
+        return _solve(tuple(last), goal, method, valid)
 
-    return _by_chunks(_whole(chunk, method, alone), inputs, _is_large(inputs[0]))
+    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
 
 
-@partial(jax.jit, static_argnums=(1, 2))
-def _field(inputs, method: str, alone: bool) -> CostToGo:
+@partial(jax.jit, static_argnums=1)
+def _field(inputs, method: str) -> CostToGo:
     def chunk(classes, levels, each, goal):
         costs, rules = each
         last = (jnp.moveaxis(a, 0, -1) for a in (classes, levels))
         valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)
         costs = jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs)
-        return _solve(half_edges(*last, costs, rules), goal, method, valid, alone)
+        return _solve(half_edges(*last, costs, rules), goal, method, valid)
 
-    return _by_chunks(_whole(chunk, method, alone), inputs, _is_large(inputs[0]))
-
-
-def _whole(chunk, method: str, alone: bool):
-    """All of a chunk's work as one function where the kernel is one: no core then waits for another.
-
-    Only in a program of its own. Within a larger one, where XLA may fuse the function with what comes before it (and
-    then fails to compile), each sweep is a function by itself: see `_solve`.
-    """
-    return kernels.one_function(chunk) if method == "line_sweep" and alone else chunk
+    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
 
 
-def _method(name: str) -> str:
-    if name not in ("auto", *kernels.METHODS):
-        raise InputError(f"must be one of auto, {', '.join(kernels.METHODS)}", field="method", value=name)
-    return kernels.default_method() if name == "auto" else name
+def _method(name: str, grids) -> str:
+    on_cpu = jax.default_backend() == "cpu"
+    allowed = METHODS if on_cpu else ("wavefront",)
+    if name not in ("auto", *allowed):
+        raise InputError(
+            f"must be one of auto, {', '.join(allowed)} on this device ({jax.default_backend()})",
+            field="method",
+            value=name,
+        )
+    if name != "auto":
+        return name
+    if not on_cpu:
+        return "wavefront"
+    cells = grids.shape[-2] * grids.shape[-1]
+    return "dijkstra" if cells > HUGE or (_is_large(grids) and grids.shape[0] < FEW) else "line_sweep"
 
 
 def _on_all_cores(solve, inputs, method: str) -> CostToGo:
-    """`solve` on pieces of one chunk each, from as many threads as there are cores, if that is any use.
-
-    Loops of this kind are serial inside a program on a CPU; programs of several threads do run side by side.
-    """
-    batch, most = inputs[0].shape[0], (LANES_LARGE if _is_large(inputs[0]) else LANES)[1]
+    """`solve` on pieces of the batch from as many threads as there are cores, if that is any use."""
+    batch, chunk = inputs[0].shape[0], CHUNK_LARGE if _is_large(inputs[0]) else CHUNK
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(inputs))
-    if not traced and jax.default_backend() == "cpu":
-        solve = _widened(solve)
-    if traced or batch <= most or jax.default_backend() != "cpu":
-        return solve(jax.tree.map(jnp.asarray, inputs), method, not traced)
+    if traced or batch <= chunk or jax.default_backend() != "cpu":
+        return solve(jax.tree.map(jnp.asarray, inputs), method)
     inputs = jax.tree.map(np.asarray, inputs)
+    size = min(batch, chunk * -(-batch // (chunk * PIECES * (os.cpu_count() or 1))))
     out = CostToGo(
         _aligned(inputs[0].shape[:1] + inputs[0].shape[-2:]), np.empty(batch, np.int32), np.empty(batch, bool)
     )
 
     def piece(start):
-        stop = min(start + most, batch)
-        part = jax.tree.map(lambda a: a[max(stop - most, 0) : stop], inputs)  # the last one overlaps: one program
-        found = solve(part, method, True)
+        stop = min(start + size, batch)
+        part = jax.tree.map(lambda a: a[stop - size : stop], inputs)  # the last one overlaps: one program
+        found = solve(part, method)
         jax.tree.map(lambda whole, a: np.copyto(whole[start:stop], np.asarray(a)[start - stop :]), out, found)
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(piece, range(0, batch, most)))
+        list(pool.map(piece, range(0, batch, size)))
     return jax.tree.map(jnp.asarray, out)
-
-
-@cache
-def _widened(solve):
-    """`solve` with the widest vectors, a tenth faster on small grids; as it is where a compiler has no such option."""
-    try:
-        jax.jit(jnp.negative, compiler_options=WIDE).lower(0.0).compile()
-    except jax.errors.JaxRuntimeError:
-        return solve
-    return jax.jit(solve, static_argnums=(1, 2), compiler_options=WIDE)
 
 
 def _aligned(shape) -> Float[np.ndarray, "..."]:
@@ -154,41 +142,29 @@ def _is_large(grids) -> bool:
     return grids.shape[-2] * grids.shape[-1] > LARGE
 
 
-def _solve(edges, goal_ij, method, valid, alone) -> CostToGo:
+def _solve(edges, goal_ij, method: str, valid) -> CostToGo:
     # Sums along a path drift by up to half a unit in the last place a move: with float32 a path through a
-    # large maze is off by more than 1e-5, so the kernels alone are then float64, in any program.
-    large = _is_large(edges[0][1:-1, 1:-1, 0])
-    with jax.enable_x64(large):
-        state = kernels.beginning(edges, goal_ij, jnp.float64 if large else jnp.float32)
-        if large and method == "line_sweep" and goal_ij.shape[0] == 1:
-            cost, steps, converged = worklist.settle(edges, state)
+    # large maze is off by more than 1e-5, so large grids are summed in float64, in any program.
+    double = method == "dijkstra" or _is_large(edges[0][1:-1, 1:-1, 0])
+    goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing is reached
+    with jax.enable_x64(double):
+        if method == "wavefront":
+            cost, steps = wavefront.settle(edges, goal_ij, double)
         else:
-            relax = kernels.METHODS[method]
-            relax = kernels.one_function(relax) if method == "line_sweep" and not alone else relax
-            cost, steps, converged = kernels.settle(relax, edges, state)
-        cost, steps = jnp.moveaxis(cost[1:-1, 1:-1].astype(jnp.float32), -1, 0), steps.astype(jnp.int32)
-    converged &= valid
-    return CostToGo(jnp.where(converged[:, None, None], cost, jnp.inf), steps, converged)
+            cost, steps = compiled.settle(edges, goal_ij, method, double)
+        return CostToGo(cost, steps.astype(jnp.int32), valid)
 
 
-def _by_chunks(solve, inputs, large):
-    """`solve(*inputs)` in chunks of the leading axis, one after the other, each stopping by itself."""
-    batch = inputs[0].shape[0]
+def _by_chunks(solve, inputs, large: bool) -> CostToGo:
+    """`solve(*inputs)` in chunks of the leading axis, one after the other."""
+    batch, size = inputs[0].shape[0], CHUNK_LARGE if large else CHUNK
     if batch == 0:
-        grid = inputs[0].shape[-2:]
-        return CostToGo(jnp.zeros((0, *grid)), jnp.zeros(0, jnp.int32), jnp.zeros(0, bool))
-    least, most = LANES_LARGE if large else LANES
-    if batch < FEW:
-        chunks, size = (batch, 1) if large else (1, batch)
-    else:
-        chunks = -(-batch // most)
-        size = max(-(-batch // chunks), least)
+        return CostToGo(jnp.zeros((0, *inputs[0].shape[-2:])), jnp.zeros(0, jnp.int32), jnp.zeros(0, bool))
+    if batch <= size:
+        return solve(*inputs)
+    chunks = -(-batch // size)
     pad = chunks * size - batch
     parts = jax.tree.map(lambda a: jnp.pad(a, ((0, pad),) + ((0, 0),) * (a.ndim - 1), mode="edge"), inputs)
-    if chunks == 1:
-        out = solve(*parts)
-    else:
-        parts = jax.tree.map(lambda a: a.reshape(chunks, size, *a.shape[1:]), parts)
-        out = lax.map(lambda part: solve(*part), parts)
-        out = jax.tree.map(lambda a: a.reshape(chunks * size, *a.shape[2:]), out)
-    return jax.tree.map(lambda a: a[:batch], out)
+    parts = jax.tree.map(lambda a: a.reshape(chunks, size, *a.shape[1:]), parts)
+    out = lax.map(lambda part: solve(*part), parts)
+    return jax.tree.map(lambda a: a.reshape(chunks * size, *a.shape[2:])[:batch], out)

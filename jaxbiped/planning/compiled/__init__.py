@@ -1,0 +1,5 @@
+"""Planners compiled by Numba for a CPU, as functions of JAX arrays."""
+
+from jaxbiped.planning.compiled.settle import METHODS, settle
+
+__all__ = ["METHODS", "settle"]

@@ -1,0 +1,88 @@
+"""The compiled planners as functions of JAX arrays, on a CPU: `line_sweep` and `dijkstra`."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numba import carray, njit
+
+from jaxbiped.planning.compiled import dijkstra, foreign, line_sweep
+
+
+@njit
+def edge(arguments, k, size):
+    """Edge costs number `k` of the arguments, flat."""
+    return carray(foreign.pointer(foreign.data(arguments, k)), (size,), np.float32)
+
+
+def solver(settle, lanes: int, dtype):
+    """`settle` for all arenas of a batch, `lanes` at a time, as `foreign.register` wants it."""
+
+    @njit
+    def solve(arguments, count, results):
+        dims = foreign.shape(arguments, 0)
+        height, width, batch = np.int64(dims[0]) - 2, np.int64(dims[1]) - 2, np.int64(dims[2])
+        size = (height + 2) * (width + 2) * batch
+        half = count == 5  # four kinds of edges and the goals
+        b = 0 if half else 4
+        edges = (
+            edge(arguments, 0, size), edge(arguments, 1, size), edge(arguments, 2, size), edge(arguments, 3, size),
+            edge(arguments, b, size), edge(arguments, b + 1, size), edge(arguments, b + 2, size),
+            edge(arguments, b + 3, size),
+        )  # fmt: skip
+        goals = carray(foreign.pointer(foreign.data(arguments, count - 1)), (batch, 2), np.int32)
+        field = carray(foreign.pointer(foreign.data(results, 0)), (batch, height, width), np.float32)
+        steps = carray(foreign.pointer(foreign.data(results, 1)), (batch,), np.int32)
+        cost = carray(foreign.pointer(foreign.data(results, 2)), (size,), dtype)
+        cost[:] = np.inf
+        for arena in range(batch):
+            i, j = goals[arena]
+            if 0 <= i < height and 0 <= j < width:
+                cost[((i + 1) * (width + 2) + j + 1) * batch + arena] = 0.0
+        for first in range(0, batch - lanes + 1, lanes):
+            steps[first : first + lanes] = settle(edges, goals, cost, first, height, width, batch, half)
+            for i in range(height):
+                for arena in range(first, first + lanes):
+                    row = ((i + 1) * (width + 2) + 1) * batch + arena
+                    for j in range(width):
+                        field[arena, i, j] = cost[row + j * batch]
+
+    return solve
+
+
+METHODS = ("line_sweep", "dijkstra")
+
+
+@cache
+def target(method: str, double: bool) -> tuple[str, int]:
+    """The name by which XLA knows a kernel, and its lanes; compiled at the first call. "dijkstra" is always float64."""
+    name = f"jaxbiped_{method}_{'float64' if double else 'float32'}"
+    lanes = (line_sweep.LANES_LARGE if double else line_sweep.LANES) if method == "line_sweep" else 1
+    settle = line_sweep.sweeps(lanes) if method == "line_sweep" else dijkstra.settle
+    foreign.register(name, solver(settle, lanes, np.float64 if double else np.float32))
+    return name, lanes
+
+
+def settle(edges, goal_ij, method: str, double: bool):
+    """(cost [B, H, W] float32, steps until nothing changed [B]), summed as float64 if `double`, else as float32.
+
+    Args:
+      edges: tuple of eight float32 arrays [H + 2, W + 2, B] with a ring of inf, the costs of leaving a cell in each of
+        `DIRECTIONS`, or of the first four where a move costs what the move back costs; none may be NaN or negative.
+      goal_ij: [B, 2]; nothing is reached from one outside the grid.
+    """
+    name, lanes = target(method, double)
+    height, width, batch = edges[0].shape
+    many = -(-batch // lanes) * lanes
+    edges = [jnp.pad(e, ((0, 0), (0, 0), (0, many - batch)), constant_values=jnp.inf) for e in edges]
+    goal_ij = jnp.pad(goal_ij.astype(jnp.int32), ((0, many - batch), (0, 0)), constant_values=-1)
+    results = (
+        jax.ShapeDtypeStruct((many, height - 2, width - 2), jnp.float32),
+        jax.ShapeDtypeStruct((many,), jnp.int32),
+        jax.ShapeDtypeStruct((height, width, many), jnp.float64 if double else jnp.float32),  # room to work in
+    )
+    cost, steps, _ = jax.ffi.ffi_call(name, results)(*edges, goal_ij)
+    return cost[:batch], steps[:batch]
