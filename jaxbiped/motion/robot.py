@@ -29,7 +29,7 @@ class FootingConfig(Model):
     """[m] that a rising edge lies ahead of the robot before its step."""
     before_down: Length = 0.025
     """[m] that a falling edge lies ahead of the robot before its step."""
-    tolerance: Length = 0.004
+    tolerance: Length = 0.005
     """[m] off that place, from which the robot corrects."""
     clear_up: Length = 0.075
     """[m] beyond an edge that rose, where the robot can turn on the spot."""

@@ -19,7 +19,7 @@ from jaxbiped.sensing.camera import Mount
 from jaxbiped.sensing.view import View
 
 REACH = 0.06  # [m] points this far off the line, on both sides, are looked at: the next edge is further
-HALF_WIDTH = 0.10  # [m] half of the edge's piece that is measured: what the two feet stand before
+HALF_WIDTH = 0.09  # [m] half of the edge's piece that is measured: what the two feet stand before
 # [m] width of the transition that is fitted, round by round: it finds an edge from 3 cm off, and ends at about the
 # distance between two rays on the ground, so that the line lies in the middle of the gap between the two sorts
 WIDTHS = (0.015, 0.015, 0.010, 0.010, 0.007, 0.005, 0.004, 0.004)
@@ -28,7 +28,7 @@ STRAY = 0.4  # share of the rise beyond it, in which a height counts at all
 TRIMMED_FROM = 4  # round from which on rays that lie clearly on the wrong side do not count, as those beside a corner
 LEAST = 8.0  # rays wanted on each side of the line
 MOST_WRONG = 0.15  # share of the rays that may lie on the wrong side
-CLEAR = 0.012  # [m] from the line on, a ray on the wrong side is wrong
+CLEAR = 0.010  # [m] from the line on, a ray on the wrong side is wrong
 # What a view is off by itself: rays are about 11 mm apart on the ground, and a row of them that runs along the edge
 # tells no more than that it lies between this row and the next.
 FLOOR_DISTANCE, FLOOR_ANGLE = 0.003, 0.02  # [m, rad] standard deviations
