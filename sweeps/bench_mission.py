@@ -131,7 +131,7 @@ def parts(repeats: int = 20):
 
     print(f"parts, {SLOTS} missions at once, one after the other (XLA may use all cores here):")
     view, sightings = part("sense", jax.vmap(partial(sense, program=PROGRAM)), world, mind, batch, setting)
-    perceive = jax.vmap(partial(decision.perceive, program=PROGRAM))
+    perceive = partial(decision.perceive, program=PROGRAM)
     mind, classes, levels, ij = part("map", perceive, mind, view, sightings, batch, setting)
     goal_ij = jax.vmap(partial(goal_cell, spec=spec))(
         batch.goal_xy, setting.limits.goal_radius, classes, setting.strategy.rules()

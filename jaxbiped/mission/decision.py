@@ -56,9 +56,7 @@ def decide(
       The mind after the measurement, the command, the code with which the mission ends of the robot's own
       will (else RUNNING), and the thought.
     """
-    mind, classes, levels, ij = jax.vmap(perceive, in_axes=(0, 0, 0, 0, 0, None))(
-        mind, view, sightings, arena, settings, program
-    )
+    mind, classes, levels, ij = perceive(mind, view, sightings, arena, settings, program)
     spec = program.spec
     blind = settings.strategy.blind
     plan_classes = jnp.where(blind[:, None, None], jnp.int8(Cell.FLOOR), classes)
@@ -85,25 +83,55 @@ def decide(
     return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij, mind.belief.pose)
 
 
-def perceive(mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program):
-    """One robot after a measurement: its mind, the classed map, and its cell."""
-    spec = program.spec
-    belief = correct(mind.belief, arena.landmarks, sightings)
-    pose = belief.pose
-    level = jnp.round(pose.z / spec.level_height).astype(jnp.int8)
-    first = mapping.mark_footprint(mapping.empty(spec), pose.x, pose.y, level, settings.limits.body_radius, spec)
-    grid_map = jax.tree.map(lambda new, old: jnp.where(mind.fresh, new, old), first, mind.grid_map)
+def perceive(
+    mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program
+) -> tuple[Mind, Int[Array, "B H W"], Int[Array, "B H W"], Int[Array, "B 2"]]:
+    """Each robot after a measurement: its mind, the classed map, and its cell."""
+    mind = replace(mind, belief=jax.vmap(correct)(mind.belief, arena.landmarks, sightings))
+    mind = begin_maps(mind, settings, program.spec)
+    return jax.vmap(read_map, in_axes=(0, 0, 0, None))(mind, view, settings, program)
+
+
+def begin_maps(mind: Mind, settings: Settings, spec: GridSpec) -> Mind:
+    """Fresh minds with a map of nothing but what their robot stands on.
+
+    Few of a batch are fresh at once, and maps are large: only theirs are written.
+    """
+    pose = mind.belief.pose
+
+    def begin(n, grid_map):
+        k = fresh[n]
+        first = mapping.mark_footprint(
+            mapping.empty(spec), pose.x[k], pose.y[k], level_of(pose.z[k], spec), settings.limits.body_radius[k], spec
+        )
+        return jax.tree.map(lambda maps, new: maps.at[k].set(new), grid_map, first)
+
+    fresh = jnp.argsort(~mind.fresh)  # their indices come first
+    grid_map = jax.lax.fori_loop(0, jnp.sum(mind.fresh), begin, mind.grid_map)
+    return replace(mind, grid_map=grid_map, fresh=jnp.zeros_like(mind.fresh))
+
+
+def level_of(z: Float[Array, ""], spec: GridSpec) -> Int[Array, ""]:
+    """The level [int8] of ground of height `z` [m]."""
+    return jnp.round(z / spec.level_height).astype(jnp.int8)
+
+
+def read_map(
+    mind: Mind, view: View, settings: Settings, program: Program
+) -> tuple[Mind, Int[Array, "H W"], Int[Array, "H W"], Int[Array, "2"]]:
+    """One robot with one more view: its mind, the classed map, and its cell."""
+    spec, pose = program.spec, mind.belief.pose
     tilted = program.sensor != "oracle"  # whose points have no attitude error to take out
-    grid_map = mapping.update(grid_map, view, pose, settings.body, settings.mapping, spec, refit=tilted)
+    grid_map = mapping.update(mind.grid_map, view, pose, settings.body, settings.mapping, spec, refit=tilted)
     classes, levels = mapping.classify(grid_map, settings.mapping, spec)
     ij = cell_of(pose.x, pose.y, spec)
     # Where the robot stands it can stand, on the level that it stands on, whatever the map makes of it.
+    level = level_of(pose.z, spec)
     own = classes[ij[0], ij[1]]
     ground = jnp.where(level > 0, Cell.BUMP, Cell.FLOOR).astype(jnp.int8)
     classes = classes.at[ij[0], ij[1]].set(jnp.where(own == Cell.GATE, own, ground))
     levels = levels.at[ij[0], ij[1]].set(level)
-    mind = replace(mind, belief=belief, grid_map=grid_map, fresh=jnp.zeros_like(mind.fresh))
-    return mind, classes, levels, ij
+    return replace(mind, grid_map=grid_map), classes, levels, ij
 
 
 def choose(
@@ -173,7 +201,18 @@ def place_feet(
     flat = mapping.level_view(view, level, settings.mapping, spec) if program.sensor != "oracle" else view
     flat = jax.lax.optimization_barrier(flat)
     eye = mount(settings.camera, mind.look, mind.squat)
-    seen = edges.measure(flat, about, jnp.clip(crossing.along, -0.1, 0.1), eye, spec.level_height)
+    aside = jnp.clip(crossing.along, -0.1, 0.1)
+    # The map has an edge's direction roughly; bumps have parallel sides more often than not.
+    turned = wrap_angle(mind.behind.angle - about.angle)
+    parallel = replace(
+        about,
+        distance=about.distance * jnp.cos(turned) + crossing.along * jnp.sin(turned),
+        angle=mind.behind.angle,
+    )
+    seen = edges.measure(flat, about, aside, eye, spec.level_height)
+    other = edges.measure(flat, parallel, aside, eye, spec.level_height)
+    likely = mind.behind.known & (jnp.abs(turned) < 1.0)
+    seen = jax.tree.map(lambda a, b: jnp.where(seen.known | ~likely, a, b), seen, other)
     seen = replace(seen, known=seen.known & crossing.edge.known)
     ahead = edges.fuse(known, seen)
     command = approach(
