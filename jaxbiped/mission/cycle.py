@@ -10,8 +10,9 @@ from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.decision import Thought, climbed, decide, walked
+from jaxbiped.mission.decision import Thought, climbed, decide
 from jaxbiped.mission.executors import EXECUTORS, Execution
+from jaxbiped.mission.footing import walked
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World

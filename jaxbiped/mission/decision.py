@@ -15,16 +15,15 @@ from jaxbiped import mapping, planning
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.mission.footing import place_feet
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
-from jaxbiped.motion.approach import approach, foresight, next_crossing, remembered
+from jaxbiped.motion.approach import foresight
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
 from jaxbiped.planning.rims import rim_costs
-from jaxbiped.sensing import edges
-from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.localisation import correct
 from jaxbiped.sensing.view import Sightings, View
 
@@ -179,57 +178,6 @@ def choose(
     )
     look = command.primitive == Primitive.LOOK
     return replace(mind, squat=command.squat, look=look, tries=tries), command, verdict.astype(jnp.int32)
-
-
-def place_feet(
-    mind: Mind,
-    view: View,
-    command: Command,
-    ij: Int[Array, "2"],
-    directions: Int[Array, "n"],
-    classes: Int[Array, "H W"],
-    levels: Int[Array, "H W"],
-    settings: Settings,
-    program: Program,
-) -> tuple[Mind, Command]:
-    """The command, or what it takes first for the feet to stand right before the next edge; what is known of that."""
-    spec, pose = program.spec, mind.belief.pose
-    crossing = next_crossing(pose, ij, directions, classes, levels, spec)
-    known = remembered(mind.ahead, crossing)
-    about = jax.tree.map(lambda k, c: jnp.where(known.known, k, c), known, crossing.edge)
-    level = jnp.round(pose.z / spec.level_height).astype(jnp.int32)
-    flat = mapping.level_view(view, level, settings.mapping, spec) if program.sensor != "oracle" else view
-    flat = jax.lax.optimization_barrier(flat)
-    eye = mount(settings.camera, mind.look, mind.squat)
-    aside = jnp.clip(crossing.along, -0.1, 0.1)
-    # The map has an edge's direction roughly; bumps have parallel sides more often than not.
-    turned = wrap_angle(mind.behind.angle - about.angle)
-    parallel = replace(
-        about,
-        distance=about.distance * jnp.cos(turned) + crossing.along * jnp.sin(turned),
-        angle=mind.behind.angle,
-    )
-    seen = edges.measure(flat, about, aside, eye, spec.level_height)
-    other = edges.measure(flat, parallel, aside, eye, spec.level_height)
-    likely = mind.behind.known & (jnp.abs(turned) < 1.0)
-    seen = jax.tree.map(lambda a, b: jnp.where(seen.known | ~likely, a, b), seen, other)
-    seen = replace(seen, known=seen.known & crossing.edge.known)
-    ahead = edges.fuse(known, seen)
-    command = approach(
-        command, pose, ij, crossing, ahead, mind.ahead, mind.behind, classes, levels, mind.look, settings.footing, spec
-    )
-    # An edge that the path has left is still there.
-    left = ~crossing.edge.known & mind.ahead.known & (mind.ahead.distance > 0)
-    ahead = jax.tree.map(lambda new, old: jnp.where(left, old, new), ahead, mind.ahead)
-    return replace(mind, ahead=ahead), command
-
-
-def walked(mind: Mind, command: Command, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> Mind:
-    """What the robot knows of the edges about it after a command, by odometry: what was ahead may now be behind."""
-    ahead, behind = (edges.predict(edge, moved, variances) for edge in (mind.ahead, mind.behind))
-    stepped = command.rise != 0
-    behind = jax.tree.map(lambda a, b: jnp.where(stepped, a, b), ahead, behind)
-    return replace(mind, ahead=replace(ahead, known=ahead.known & ~stepped), behind=behind)
 
 
 def nearest_direction(yaw: Float[Array, ""]) -> Int[Array, ""]:

@@ -19,6 +19,7 @@ from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.motion.edge import crossing_direction
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.robot import Footing
+from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning import DIRECTIONS
 from jaxbiped.sensing.edges import Edge, prior_cov
 
@@ -33,6 +34,7 @@ SURE_DISTANCE, SURE_ANGLE = 0.0028, 0.035  # [m, rad] standard deviations of an 
 SLACK = 0.01  # [m] kept between the feet and an edge that they do not step over
 LANES = np.array([0.0, 0.025, -0.025, 0.05, -0.05, 0.075, -0.075, 0.10, -0.10], np.float32)  # [m] to the side, tried
 SAME_PLACE, SAME_ANGLE = 0.08, 1.0  # [m, rad] that the map may have an edge off the place where it was measured
+IN_VIEW = 1.0  # [rad] off the heading, up to which an edge shows when the robot looks down
 STEADY = 0.09  # [rad] standard deviation of an edge's angle, above which it is measured again before a turn
 
 
@@ -68,7 +70,7 @@ def next_crossing(
     kinds, heights = classes[cells[:, 0], cells[:, 1]], levels[cells[:, 0], cells[:, 1]].astype(jnp.int32)
     rises = heights[1:] - heights[:-1]
     walked = (kinds[1:] == Cell.FLOOR) | (kinds[1:] == Cell.BUMP)
-    reached = jnp.cumprod((walked & (directions >= 0)).astype(jnp.int32)).astype(bool) & (kinds[0] != Cell.GATE)
+    reached = jnp.cumprod((walked & (directions >= 0)).astype(jnp.int32)).astype(bool)
     over = reached & (rises != 0)
     k = jnp.argmax(over)
     step_ij, rise = steps[k], jnp.clip(rises[k], -1, 1)
@@ -131,32 +133,34 @@ def approach(
     # Turned square to it, the robot walks as far as it trusts the line.
     vague = ~measured.known | (sd_angle > STEADY)
     ahead = jnp.where(vague & askew, 0.0, jnp.where(sure | (s < STAGE + 0.02), gap, s - STAGE))
-    aside = ~askew & (jnp.abs(lane) > SIDESTEP)
+    aside = ~askew & (jnp.abs(lane) > SIDESTEP) & (measured.known | looked)
     off = jnp.abs(gap) > footing.tolerance
     ready = ~askew & ~aside & ~off & (sure | looked)
     look = ~askew & ~aside & ~off & ~sure & ~looked
-    # Before it walks up to a line that only the map knows, it looks.
-    look = look | (~measured.known & ~looked & ~askew & (s < NEAR))
+    # Before it moves by a line that only the map knows, it looks.
+    look = look | (~measured.known & ~looked & (jnp.abs(angle) < IN_VIEW))
 
-    turn = jnp.where(askew | (ready & (jnp.abs(angle) > RESIDUAL)), angle, 0.0)
+    turn = jnp.where((askew & ~look) | (ready & (jnp.abs(angle) > RESIDUAL)), angle, 0.0)
     turn = jnp.where(tight, 0.0, turn)
     length = jnp.where(jnp.abs(ahead) > footing.tolerance, ahead, 0.0)
     length = jnp.where(aside, 0.0, length)
     length = jnp.where(tight, retreat, length)
     length = jnp.where(ready, footing.length, jnp.where(look, 0.0, length))
     step = jnp.where(up, Primitive.STEP_UP_BUMP, Primitive.STEP_DOWN_BUMP)
-    walk = jnp.where(length == 0, Primitive.NONE, Primitive.STRAIGHT_FORWARD)
+    in_gate = classes[ij[0], ij[1]] == Cell.GATE
+    walk = jnp.where(in_gate, Primitive.PASS_GATE, Primitive.STRAIGHT_FORWARD)
+    walk = jnp.where(length == 0, Primitive.NONE, walk)
     near_command = Command(
         turn=turn,
         primitive=jnp.where(ready, step, jnp.where(look, Primitive.LOOK, walk)).astype(jnp.int32),
         length=length,
         rise=jnp.where(ready, edge.rise, 0).astype(jnp.int32),
-        squat=jnp.zeros_like(command.squat),
+        squat=in_gate & ~ready & ~look,
         left=jnp.where(aside & ~look, lane, 0.0),
     )
-    far_command = clear_of(behind, command, pose, classes, levels, footing, spec)
-    far_command = short_of(crossing, s, angle, far_command)
+    far_command = short_of(crossing, s, angle, command)
     chosen = jax.tree.map(lambda a, b: jnp.where(near, a, b), near_command, far_command)
+    chosen = clear_of(behind, chosen, pose, classes, levels, footing, spec)
     return back_off(held, chosen, footing)
 
 
@@ -190,9 +194,7 @@ def best_lane(
         """Class and level at `u` beyond the edge and `v` to the left."""
         cos, sin = jnp.cos(edge.angle), jnp.sin(edge.angle)
         u = u + edge.distance
-        x, y = to_world(pose, u * cos - v * sin, u * sin + v * cos)
-        i = jnp.clip(jnp.floor(y / spec.pitch), 0, spec.shape[0] - 1).astype(jnp.int32)
-        j = jnp.clip(jnp.floor(x / spec.pitch), 0, spec.shape[1] - 1).astype(jnp.int32)
+        i, j = cell_of(*to_world(pose, u * cos - v * sin, u * sin + v * cos), spec)
         return classes[i, j], levels[i, j].astype(jnp.int32)
 
     bad = jnp.zeros(along.shape)
@@ -223,11 +225,12 @@ def clear_of(
     clear = jnp.where(behind.rise > 0, footing.clear_up, footing.clear_down)
     short = jnp.clip(clear + behind.distance, 0.0, 0.06)
     turns = (jnp.abs(command.turn) > LARGE) & (command.primitive != Primitive.LOOK)
-    x, y = to_world(pose, short + 0.05, jnp.zeros_like(short))
-    i = jnp.clip(jnp.floor(y / spec.pitch), 0, spec.shape[0] - 1).astype(jnp.int32)
-    j = jnp.clip(jnp.floor(x / spec.pitch), 0, spec.shape[1] - 1).astype(jnp.int32)
+    # Where it would come to stand, and where its toes would be.
+    ahead = jnp.stack([short, short + 0.05])
+    i, j = cell_of(*to_world(pose, ahead, jnp.zeros_like(ahead)), spec)
     level = jnp.round(pose.z / spec.level_height)
-    free = (classes[i, j] != Cell.OBSTACLE) & (classes[i, j] != Cell.UNMEASURED) & (levels[i, j] == level)
+    walkable = (classes[i, j] == Cell.FLOOR) | (classes[i, j] == Cell.BUMP)
+    free = jnp.all(walkable & (levels[i, j] == level))
     leave = behind.known & turns & (short > footing.tolerance) & free & (jnp.abs(behind.angle) < 0.5)
     return replace(
         command,

@@ -22,8 +22,8 @@ def stride(spec: GridSpec) -> int:
     return max(1, round(CELL / spec.pitch))
 
 
-def cell_of(x: Float[Array, ""], y: Float[Array, ""], spec: GridSpec) -> Int[Array, "2"]:
-    """The cell (i, j) that holds a point [m]; points outside give the nearest cell."""
+def cell_of(x: Float[Array, "*S"], y: Float[Array, "*S"], spec: GridSpec) -> Int[Array, "2 *S"]:
+    """The cell (i, j) that holds each point [m]; points outside give the nearest cell."""
     height, width = spec.shape
     i = jnp.clip(jnp.floor(y / spec.pitch), 0, height - 1)
     j = jnp.clip(jnp.floor(x / spec.pitch), 0, width - 1)
