@@ -16,6 +16,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.errors import InputError
 from jaxbiped.physics.backend import LIMIT, WARNINGS
+from jaxbiped.physics.model import REPORT
 
 with contextlib.redirect_stdout(io.StringIO()):  # it prints that MuJoCo Warp is not installed; few need to know
     from mujoco import mjx
@@ -23,6 +24,13 @@ with contextlib.redirect_stdout(io.StringIO()):  # it prints that MuJoCo Warp is
     from jaxbiped.physics.refusals import refusals
 
 SLOTS = "max_contact_points"
+GROWS = {  # sizes of a geom that a margin adds to
+    mujoco.mjtGeom.mjGEOM_SPHERE: (1, 0, 0),
+    mujoco.mjtGeom.mjGEOM_CAPSULE: (1, 0, 0),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: (1, 1, 0),
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: (1, 1, 1),
+    mujoco.mjtGeom.mjGEOM_BOX: (1, 1, 1),
+}
 EDGES = 6  # constraint rows a contact for which there is room in Warp: 4 of friction, and as many of joint limits
 STATE = (  # all that a step reads of the data before it
     *("time", "qpos", "qvel", "act", "history", "qacc_warmstart", "plugin_state", "sensordata"),
@@ -41,6 +49,33 @@ def device_of(platform: str | None) -> jax.Device:
     except RuntimeError:
         there = ", ".join(sorted({device.platform for device in jax.devices()}))
         raise InputError(f"no such device is there; JAX sees {there}", field="device", value=platform) from None
+
+
+def grow(model: mujoco.MjModel) -> np.ndarray:
+    """Turn the margins of geoms into size, in place; returns what was added to each size, [ngeom, 3].
+
+    MJX finds a box on a plane only when they touch, and not within the margin: feet at rest would have contacts that
+    come and go, with forces that jump. A geom that is larger by its margin has the same forces at the same distances.
+    """
+    growth = np.zeros_like(model.geom_size)
+    for g, kind in enumerate(model.geom_type):
+        if model.geom_margin[g] and mujoco.mjtGeom(int(kind)) in GROWS:
+            growth[g] = np.multiply(GROWS[mujoco.mjtGeom(int(kind))], model.geom_margin[g])
+    model.geom_size += growth
+    model.geom_rbound += np.linalg.norm(growth, axis=1) * (model.geom_rbound > 0)
+    model.geom_margin[growth.any(axis=1)] = 0.0
+    return growth
+
+
+def watched_distances(model: mujoco.MjModel, margin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Columns of the sensor data that are distances of two geoms, and the margins [m] of these, which `grow` took."""
+    columns, margins = [], []
+    for s in np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_CONTACT):
+        ends = {int(model.sensor_objtype[s]), int(model.sensor_reftype[s])}
+        if ends == {int(mujoco.mjtObj.mjOBJ_GEOM)} and model.sensor_intprm[s, 0] == REPORT and model.sensor_dim[s] == 2:
+            columns.append(model.sensor_adr[s] + 1)
+            margins.append(margin[model.sensor_objid[s]] + margin[model.sensor_refid[s]])
+    return np.array(columns, int), np.array(margins)
 
 
 class Engine:
@@ -62,6 +97,9 @@ class Engine:
         limit = int(model.numeric_data[slots]) if slots >= 0 else None
         if limit is not None:
             model.numeric_data[slots] = limit + 1
+        margin = model.geom_margin.copy()
+        self.growth = grow(model) if impl == "jax" else np.zeros_like(model.geom_size)
+        self.distances, self.taken = watched_distances(model, margin - model.geom_margin)
         try:
             self.model = mjx.put_model(model, self.device, impl)
             # Warp's contacts are in one buffer for all simulations, its constraints in one a simulation.
@@ -100,12 +138,16 @@ class Engine:
     def step(self, model: Any, overrides: dict[str, Array], data: Any, control: Float[Array, "nu"]) -> Any:
         """One step of one simulation with its own fields."""
         data = data.replace(ctrl=control)
-        if not overrides:
-            return mjx.step(model, data)
-        model = model.tree_replace(overrides)
-        if self.impl == "warp" and len(self.static):
+        if self.growth.any() and "geom_size" in overrides:
+            overrides = overrides | {"geom_size": overrides["geom_size"] + self.growth}
+        if overrides:
+            model = model.tree_replace(overrides)
+        if overrides and self.impl == "warp" and len(self.static):
             data = self.place_static(model, data)
-        return mjx.step(model, data)
+        data = mjx.step(model, data)
+        if self.taken.any():
+            data = data.replace(sensordata=data.sensordata.at[self.distances].add(self.taken))
+        return data
 
     def place_static(self, model: Any, data: Any) -> Any:
         """Put static geoms where the model has them: Warp does so only when it makes its data."""

@@ -7,11 +7,13 @@ import sys
 import time
 
 import jax
+import mujoco
 import numpy as np
 import pytest
 
 from jaxbiped import physics
 from jaxbiped.errors import InputError
+from jaxbiped.physics.engine import grow
 from tests.physics.models import BATCH, HOPPER, PENDULUM, WATCH, hops
 
 BALLS = """
@@ -149,3 +151,39 @@ def test_warp_is_as_mujoco(native):
     assert ours.valid.all()
     np.testing.assert_allclose(ours.qpos[..., :3], reference.qpos[..., :3], atol=1e-4, rtol=0)  # 1e-6 measured
     np.testing.assert_array_equal(ours.touched, reference.touched)
+
+
+MARGINS = """
+<mujoco>
+  <option timestep="0.005"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="0 0 .1"/>
+    <geom name="block" type="box" pos="1 0 0.1" size=".2 .2 .1"/>
+    <body pos="0 0 0.052"><freejoint/><geom name="foot" type="box" size=".05 .03 .05" mass="1" margin="0.002"/></body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def test_margins_become_size():
+    model = mujoco.MjModel.from_xml_string(MARGINS)
+    growth = grow(model)
+    foot = model.geom("foot").id
+    np.testing.assert_allclose(growth[foot], 0.002)
+    np.testing.assert_allclose(model.geom_size[foot], [0.052, 0.032, 0.052])
+    assert not model.geom_margin.any() and not np.delete(growth, foot, axis=0).any()
+
+
+@pytest.mark.slow
+def test_margins_are_as_in_mujoco():
+    """A box rests above floor and block by its margin; MJX itself has no such contact on a plane."""
+    qpos = np.array([[0, 0, 0.052, 1, 0, 0, 0], [1, 0, 0.252, 1, 0, 0, 0], [0, 0, 0.04, 1, 0, 0, 0]], float)
+    watch = {"floor": (("foot", "floor"),), "block": (("foot", "block"),)}
+    rolls = [
+        physics.make(name, MARGINS, 3, watch=watch, fields=("geom_size",)).rollout(np.zeros((3, 40, 0)), qpos)
+        for name in ("native", "mjx")
+    ]
+    assert rolls[0].qpos[0, -1, 2] > 0.0512
+    np.testing.assert_allclose(rolls[1].qpos[:, -1, 2], rolls[0].qpos[:, -1, 2], atol=5e-5)
+    np.testing.assert_array_equal(rolls[1].touched, rolls[0].touched)
+    np.testing.assert_allclose(rolls[1].depth, rolls[0].depth, atol=1e-4)
