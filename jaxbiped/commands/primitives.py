@@ -24,7 +24,7 @@ from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.catalogue import PAPER, Pace, catalogue
 from jaxbiped.motion.gait import PrimitiveTable, generate
 from jaxbiped.physics.spread import SETS
-from jaxbiped.physics.trial import Disturbance, Tolerance, passes_gate
+from jaxbiped.physics.trial import RIMS, Disturbance, Tolerance, passes_gate
 from jaxbiped.physics.verify import trials
 from jaxbiped.report.library import library, library_text
 from jaxbiped.report.primitives import markdown, save_windows, terminal
@@ -45,6 +45,7 @@ LIMITS = {  # disturbances one at a time: unit, and the values tried
 }
 OF_EDGES, OF_GATES = ("rise", "edge", "yaw"), ("yaw", "lateral", "clearance")
 SERVO = (0.5, 1.0, 2.0)  # [deg] standard deviations of servo offsets
+RIM_EDGE = np.arange(0.0, 0.0901, 0.0025)  # [m] from where the robot starts
 WINDOW_EDGE, WINDOW_YAW = np.linspace(-0.035, 0.035, 15), np.linspace(-20, 20, 11)  # [m], [deg]
 
 
@@ -137,7 +138,7 @@ def verify(name: str, table: PrimitiveTable, robot: RobotModelConfig, args: Prim
     """All trials of one primitive, one row each."""
     options = {} if args.backend == "native" else {"device": args.device}
     parts = []
-    for record, sets in ((True, recorded(args)), (False, probes(table, args))):
+    for record, sets in ((True, recorded(args)), (False, probes(name, table, args))):
         names, disturbances = zip(*sets, strict=True)
         result = trials(table, robot, disturbances, args.backend, record=record, **options)
         parts.append(rows_of(name, names, disturbances, result))
@@ -151,8 +152,8 @@ def recorded(args: PrimitivesArgs) -> Iterator[tuple[str, Disturbance]]:
         yield from ((name, disturbance) for disturbance in chosen.draws(args.draws, args.seed))
 
 
-def probes(table: PrimitiveTable, args: PrimitivesArgs) -> Iterator[tuple[str, Disturbance]]:
-    """Disturbances one at a time; and edges at all distances and yaws."""
+def probes(name: str, table: PrimitiveTable, args: PrimitivesArgs) -> Iterator[tuple[str, Disturbance]]:
+    """Disturbances one at a time; edges of a step at all distances and yaws, and edges that are not expected."""
     request = table.request
     for factor, (unit, values) in LIMITS.items():
         applies = request.rise if factor in OF_EDGES and factor not in OF_GATES else True
@@ -164,6 +165,8 @@ def probes(table: PrimitiveTable, args: PrimitivesArgs) -> Iterator[tuple[str, D
     for degrees in SERVO:
         for _ in range(max(1, args.draws // 4)):
             yield f"servo {degrees:g}", Disturbance(servo=tuple(rng.normal(0.0, degrees * DEG, 12).tolist()))
+    if name == "straight":
+        yield from ((f"rim {rim}", Disturbance(rim=rim, edge=float(edge))) for rim in RIMS for edge in RIM_EDGE)
     if request.rise:
         for edge in WINDOW_EDGE:
             yield from (("window", Disturbance(edge=float(edge), yaw=float(yaw) * DEG)) for yaw in WINDOW_YAW)

@@ -46,6 +46,30 @@ class Window(Model):
         return self
 
 
+class Rims(Model):
+    """Where an edge that a primitive does not step over may lie: [m] from the middle of the nearest sole, where the
+    robot comes to stand, outwards: ahead of it, or to its outer side. Nearer than that it falls.
+
+    A rise whose edge is further ahead than that stops the toes, and the robot stands short; it does not fall.
+    """
+
+    up_ahead: float
+    up_aside: float
+    down_ahead: float
+    down_aside: float
+
+
+class Feet(Model):
+    """Of the robot that was verified."""
+
+    length: Annotated[float, pydantic.Field(gt=0.0)]
+    """[m]"""
+    width: Annotated[float, pydantic.Field(gt=0.0)]
+    """[m]"""
+    offset: Annotated[float, pydantic.Field(gt=0.0)]
+    """[m] of each sole's middle to the side."""
+
+
 class Entry(Model):
     """One primitive on the mild set."""
 
@@ -85,6 +109,8 @@ class LibraryConfig(Model):
     """The command line that wrote it."""
     pace: str
     seed: Count
+    feet: Feet
+    rims: Rims
     primitives: dict[str, Entry]
 
     @pydantic.model_validator(mode="after")
@@ -112,6 +138,8 @@ class LibraryConfig(Model):
             root=single(np.linalg.cholesky(covariances)),
             falls=single([entry.falls / entry.trials for entry in entries]),
             sway=single([entry.sway for entry in entries]),
+            feet=single(list(self.feet.model_dump().values())),
+            rims=single(list(self.rims.model_dump().values())),
             ahead=single([window.ahead for window in windows]),
             edge=single(windows[0].edge),
             yaw=single(windows[0].yaw),
@@ -129,6 +157,8 @@ class Library:
     root: Float[Array, "*B 6 3 3"]  # Cholesky factor of its covariance
     falls: Float[Array, "*B 6"]  # probability
     sway: Float[Array, "*B 6"]  # [m]
+    feet: Float[Array, "*B 3"]  # [m] length, width, offset
+    rims: Float[Array, "*B 4"]  # [m] up ahead, up aside, down ahead, down aside
     ahead: Float[Array, "*B 2"]  # [m] where edges should be
     edge: Float[Array, "*B E"]  # [m] of the windows, further away than that
     yaw: Float[Array, "*B Y"]  # [rad]

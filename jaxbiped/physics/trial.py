@@ -18,6 +18,10 @@ SETTLE = 0.4  # [s] that the robot stands before and after the primitive
 WINDOW = 10  # steps (50 ms) that contact forces are averaged over, less than the pendulum's time constant
 
 
+RIMS = ("up ahead", "up aside", "down ahead", "down aside")  # of one step's height, ahead or to the left
+STEP = 0.03  # [m] height of a rim
+
+
 @dataclass(frozen=True)
 class Disturbance:
     """What differs from what the primitive was made for; by default nothing."""
@@ -31,6 +35,7 @@ class Disturbance:
     servo: tuple[float, ...] = (0.0,) * (2 * len(JOINTS))  # [rad] zero offset of each servo
     slope: float = 0.0  # [rad] of all ground, rising ahead
     clearance: float = 0.37  # [m] under the gate's lintel
+    rim: str = ""  # one of RIMS: an edge that the primitive does not know of, `edge` [m] from where the robot starts
 
 
 class Tolerance(Model):
@@ -86,9 +91,16 @@ def passes_gate(request: Request) -> bool:
     return request.squat and not request.squat_start and not request.squat_end
 
 
-def boxes_of(request: Request) -> int:
-    """Boxes that a trial of a primitive needs: a bump, or two posts and a lintel."""
-    return 1 if request.rise else 3 if passes_gate(request) else 0
+def boxes_of(request: Request, *disturbances: Disturbance) -> int:
+    """Boxes that trials of a primitive need: a bump, or two posts and a lintel, or a rim."""
+    return 1 if request.rise else 3 if passes_gate(request) else int(any(d.rim for d in disturbances))
+
+
+def ground_after(request: Request, d: Disturbance) -> float:
+    """Height [m] of the ground that the robot should stand on in the end."""
+    if d.rim:
+        return STEP if d.rim.startswith("down") else 0.0
+    return request.rise + d.rise if request.rise > 0 else 0.0
 
 
 def lay_out(model: mujoco.MjModel, table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance) -> float:
@@ -101,7 +113,11 @@ def lay_out(model: mujoco.MjModel, table: PrimitiveTable, robot: RobotModelConfi
     model.opt.gravity[:] = -GRAVITY * math.sin(d.slope), 0.0, -GRAVITY * math.cos(d.slope)
     half = 0.5
     heading = np.array([math.cos(d.yaw), math.sin(d.yaw)])
-    if request.rise:
+    if d.rim:
+        up, side = d.rim.startswith("up"), np.array([0.0, 1.0] if d.rim.endswith("aside") else [1.0, 0.0])
+        start = 0.0 if up else STEP
+        set_box(model, 0, tuple((d.edge + (half if up else -half)) * side), 0.0, (half, half), -0.1, STEP)
+    elif request.rise:
         edge = np.array([nominal_edge(request, robot) + d.edge, 0.0])
         sign = math.copysign(1.0, request.rise)
         height = abs(request.rise) + sign * d.rise
@@ -128,7 +144,7 @@ def play(table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance | None =
       record: measure the zero moment point from contact forces, which takes most of the time.
     """
     d = d or Disturbance()
-    model = add_terrain(robot_spec(robot), boxes_of(table.request)).compile()
+    model = add_terrain(robot_spec(robot), boxes_of(table.request, d)).compile()
     ground = lay_out(model, table, robot, d)
     data = mujoco.MjData(model)
     home = home_table(robot, table.request.squat_start)
@@ -157,8 +173,7 @@ def play(table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance | None =
             margin = min(margin, contact_margin(data, robot, np.sum(recent, axis=0)))
     request, end = table.request, stand(data)
     moved = relative(end, start) - [request.forward, request.left, request.turn]
-    expected = request.rise + d.rise if request.rise > 0 else 0.0
-    height = max(abs(data.site(f"sole_{side}").xpos[2] - expected) for side in SIDES)
+    height = max(abs(data.site(f"sole_{side}").xpos[2] - ground_after(request, d)) for side in SIDES)
     tilt = math.acos(min(1.0, max(-1.0, data.body("torso").xmat[8])))
     return Outcome(moved, height, tilt, touched, int(sum(w.number for w in data.warning)), margin, torque, speed)
 

@@ -27,6 +27,7 @@ from jaxbiped.physics.trial import (
     Disturbance,
     Tolerance,
     boxes_of,
+    ground_after,
     lay_out,
     middle_of,
     passes_gate,
@@ -119,7 +120,7 @@ def trials(
     steps = len(table.ctrl) + 2 * round(SETTLE / table.timestep)
     width = 80 if record else 4
     size = min(len(disturbances), max(1, ROOM // (steps * width)))
-    boxes = boxes_of(table.request)
+    boxes = boxes_of(table.request, *disturbances)
     spec = trial_spec(robot, boxes)
     watch = {"limbs": tuple((part, f"box_{k}") for part in ("head", "torso") for k in range(boxes))} if boxes else {}
     made = physics.make(backend, spec, size, watch=watch, fields=VARIED, free_joint=True, **options)
@@ -171,8 +172,7 @@ def measure(
     begin = round(SETTLE / table.timestep) // every - 1
     soles = np.stack([read(f"pos_{side}") for side in SIDES], axis=2)  # [B, R, 2, 3]
     moved = relative(middle_of(soles[:, -1]), middle_of(soles[:, begin]))
-    rise = np.array([d.rise for d in disturbances])
-    expected = request.rise + rise if request.rise > 0 else np.zeros(count)
+    expected = np.array([ground_after(request, d) for d in disturbances])
     out = {
         "error": moved - [request.forward, request.left, request.turn],
         "height": np.abs(soles[:, -1, :, 2] - expected[:, None]).max(axis=1),

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 import polars as pl
 
-from jaxbiped.mission.library import Entry, LibraryConfig, Window
+from jaxbiped.mission.library import Entry, Feet, LibraryConfig, Rims, Window
 from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.gait import PrimitiveTable
-from jaxbiped.physics.trial import nominal_edge
+from jaxbiped.physics.trial import RIMS, nominal_edge
 
 SET = "mild"  # whose trials the library's displacements are of
 
@@ -30,7 +30,24 @@ def library(
       rows: trials as `commands.primitives` writes them.
     """
     entries = {name: entry(rows.filter(pl.col("primitive") == name), table, robot) for name, table in tables.items()}
-    return LibraryConfig.model_construct(command=command, pace=pace, seed=seed, primitives=entries)
+    body, straight = robot.proportions, tables.get("straight")
+    feet = Feet(length=body.foot_length, width=body.foot_width, offset=body.hip_offset)
+    found = rims(rows, straight.request.forward, body.hip_offset) if straight else None
+    return LibraryConfig.model_construct(
+        command=command, pace=pace, seed=seed, feet=feet, rims=found, primitives=entries
+    )
+
+
+def rims(rows: pl.DataFrame, forward: float, offset: float) -> Rims:
+    """Where edges that are not expected may lie: half way between the nearest that is borne and the next."""
+    found = {}
+    for rim in RIMS:
+        tried = rows.filter(pl.col("set") == f"rim {rim}").sort("edge")
+        edges, fell = tried["edge"].to_numpy(), tried["fell"].to_numpy()
+        last = int(np.flatnonzero(fell)[-1])
+        middle = offset if rim.endswith("aside") else forward
+        found[rim.replace(" ", "_")] = rounded([(edges[last] + edges[last + 1]) / 2 - middle])[0]
+    return Rims(**found)
 
 
 def entry(rows: pl.DataFrame, table: PrimitiveTable, robot: RobotModelConfig) -> Entry:
@@ -87,6 +104,9 @@ def library_text(made: LibraryConfig) -> str:
         f"pace = {quoted(made.pace)}",
         f"seed = {made.seed}",
     ]
+    for name, one in (("feet", made.feet), ("rims", made.rims)):
+        if one is not None:
+            lines += ["", f"[{name}]", *(f"{key} = {written(value)}" for key, value in one.model_dump().items())]
     for name, one in made.primitives.items():
         values = one.model_dump(exclude={"window", "covariance"})
         lines += ["", f"[primitives.{name}]", *(f"{key} = {written(value)}" for key, value in values.items())]
