@@ -69,7 +69,9 @@ class Mjx:
         self.start = jax.jit(self.traced_start)
         self.keep = jax.jit(self.traced_keep)
         with jax.default_device(self.engine.device):
-            self.data = jax.jit(jax.vmap(self.engine.at))(np.tile(self.model.qpos0, (self.batch_size, 1)))
+            data = jax.jit(jax.vmap(self.engine.at))(np.tile(self.model.qpos0, (self.batch_size, 1)))
+            # Bound to the device, as all that comes out of a block is: XLA would compile the block again for the rest.
+            self.data = jax.device_put(data, self.engine.device)
             self.warned = self.unwarned()
         self.steps = np.zeros(self.batch_size, np.int64)  # since each reset
 
@@ -156,7 +158,7 @@ class Mjx:
     def compile(self) -> float:
         """See `Backend.compile`."""
         begin = time.perf_counter()
-        block = jnp.zeros((self.options.block, self.batch_size, self.model.nu))
+        block = np.zeros((self.options.block, self.batch_size, self.model.nu), np.float32)
         overrides, data = self.overridden(self.living), self.data
         out = self.block(self.engine.model, overrides, data, self.warned, self.untouched(), block, np.int32(0))
         jax.block_until_ready(out)

@@ -141,3 +141,4 @@ def test_it_compiles_once(mjx):
     mjx.advance(controls[:, :1])
     assert mjx.compile() < 5
     assert mjx.traces == 1
+    assert mjx.block._cache_size() == 1  # XLA compiles again for arrays that are not bound to the device
