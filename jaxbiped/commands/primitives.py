@@ -9,7 +9,7 @@ import math
 import shlex
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -19,10 +19,14 @@ import pydantic
 from rich.console import Console
 
 from jaxbiped.config import Model, config_hash, load
+from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.catalogue import PAPER, Pace, catalogue
 from jaxbiped.motion.gait import PrimitiveTable, generate
+from jaxbiped.motion.request import Request
+from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.physics.agreement import CROSSING, outcomes, paths
 from jaxbiped.physics.spread import SETS
 from jaxbiped.physics.trial import RIMS, Disturbance, Tolerance, passes_gate
 from jaxbiped.physics.verify import trials
@@ -46,6 +50,8 @@ LIMITS = {  # disturbances one at a time: unit, and the values tried
 OF_EDGES, OF_GATES = ("rise", "edge", "yaw"), ("yaw", "lateral", "clearance")
 SERVO = (0.5, 1.0, 2.0)  # [deg] standard deviations of servo offsets
 RIM_EDGE = np.arange(0.0, 0.0901, 0.0025)  # [m] from where the robot starts
+APART, HARD_CASES = 1e-3, 64  # [m] that backends may be apart; trials whose outcomes must be the same
+DIFFERENT = 1  # exit status
 WINDOW_EDGE, WINDOW_YAW = np.linspace(-0.035, 0.035, 15), np.linspace(-20, 20, 11)  # [m], [deg]
 
 
@@ -69,8 +75,15 @@ class PrimitivesArgs(Model):
     """Where MJX steps; by default where JAX does."""
     robot: Path | None = None
     """Robot model, a TOML file such as configs/robots/enuvo_walk_model.toml; its values are the defaults."""
+    bump: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.03
+    """[m] height of the bump that is stepped over."""
+    gate: Annotated[float, pydantic.Field(gt=0.0, le=10.0)] = 0.37
+    """[m] under the lintel of the gate that is passed."""
     videos: bool = True
     """Write a video of each primitive, played undisturbed."""
+    against: Literal["mjx"] | None = None
+    """Write nothing, and print how far this backend is from `native`: at every moment of each primitive, and in the
+    outcomes of 64 steps up of which about a third fails. Exit status 1 when it is more than 1 mm or one differs."""
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/primitives."""
 
@@ -79,17 +92,22 @@ def main(args: PrimitivesArgs) -> int:
     """Run the command.
 
     Returns:
-      Exit status 0.
+      Exit status 0; with `against`, 1 when the backends do not agree.
 
     Raises:
       InputError: a robot that cannot play a primitive (which joint or leg, and when), a device that is not there, a
         folder that exists or cannot be written.
     """
     out = args.out or Path("results") / "primitives"
-    refuse_existing(out)
+    if not args.against:
+        refuse_existing(out)
     robot = load(RobotModelConfig, args.robot) if args.robot else RobotModelConfig()
-    tables = {name: generate(request, robot) for name, request in catalogue(args.pace).items() if name in args.only}
+    asked = {name: request for name, request in catalogue(args.pace, args.bump).items() if name in args.only}
+    refuse_what_cannot_be(asked, robot, args)
+    tables = {name: generate(request, robot) for name, request in asked.items()}
     console, start = Console(), time.perf_counter()
+    if args.against:
+        return agree(tables, robot, args, console)
     frames = []
     for name, table in tables.items():
         begin = time.perf_counter()
@@ -129,6 +147,37 @@ def main(args: PrimitivesArgs) -> int:
     return 0
 
 
+def refuse_what_cannot_be(asked: Mapping[str, Request], robot: RobotModelConfig, args: PrimitivesArgs) -> None:
+    """Raise `InputError` about a bump or a gate that the robot is not made for."""
+    highest = RobotConfig().step
+    if any(request.rise for request in asked.values()) and args.bump > highest:
+        raise InputError(f"must be at most the robot's step height, {highest:g} m", field="--bump", value=args.bump)
+    low = robot.head_squatting
+    if any(passes_gate(request) for request in asked.values()) and args.gate <= low:
+        raise InputError(f"must be above the squatting robot's head, {low:g} m", field="--gate", value=args.gate)
+
+
+def agree(tables: Mapping[str, PrimitiveTable], robot: RobotModelConfig, args: PrimitivesArgs, console: Console) -> int:
+    """Print how far another backend is from `native`; the exit status."""
+    good = True
+    for name, table in tables.items():
+        furthest, when = paths(table, robot, args.against, device=args.device).worst
+        good = good and furthest <= APART
+        console.print(
+            f"{name}, {table.duration:g} s: at most {1e3 * furthest:.2f} mm apart, at {when:.1f} s", highlight=False
+        )
+    if "step_up" in tables:
+        disturbances = CROSSING.draws(HARD_CASES, args.seed)
+        native, other = outcomes(tables["step_up"], robot, disturbances, args.against, device=args.device)
+        same = int((native == other).sum())
+        good = good and same == HARD_CASES
+        console.print(
+            f"{HARD_CASES} hard steps up: {native.sum()} succeed in native and {other.sum()} in {args.against}, "
+            f"the same in {same}", highlight=False,
+        )  # fmt: skip
+    return 0 if good else DIFFERENT
+
+
 def write(path: Path, data: bytes) -> None:
     """A whole file or none."""
     write_whole(path, lambda file: file.write(data))
@@ -140,6 +189,8 @@ def verify(name: str, table: PrimitiveTable, robot: RobotModelConfig, args: Prim
     parts = []
     for record, sets in ((True, recorded(args)), (False, probes(name, table, args))):
         names, disturbances = zip(*sets, strict=True)
+        lower = args.gate - Disturbance().clearance
+        disturbances = [dataclasses.replace(d, clearance=d.clearance + lower) for d in disturbances]
         result = trials(table, robot, disturbances, args.backend, record=record, **options)
         parts.append(rows_of(name, names, disturbances, result))
     return pl.concat(parts).with_columns(simulated=pl.lit(table.duration))

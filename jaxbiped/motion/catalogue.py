@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Literal
 
@@ -37,6 +38,10 @@ FAST = {  # [s] as fast as servos and balance safely allow
 }
 
 
-def catalogue(pace: Pace = "paper") -> dict[str, Request]:
-    """Every primitive by name, at the paper's durations or fast."""
-    return {name: request if pace == "paper" else request.lasting(FAST[name]) for name, request in PAPER.items()}
+def catalogue(pace: Pace = "paper", bump: float = 0.03) -> dict[str, Request]:
+    """Every primitive by name, at the paper's durations or fast, over a bump of a height [m]."""
+    asked = {name: request if pace == "paper" else request.lasting(FAST[name]) for name, request in PAPER.items()}
+    return {
+        name: dataclasses.replace(request, rise=math.copysign(bump, request.rise)) if request.rise else request
+        for name, request in asked.items()
+    }

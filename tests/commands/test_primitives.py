@@ -75,10 +75,16 @@ def test_the_same_seed_is_the_same_library(here):
         (["--robot", "weak.toml", "--only", "turn"], ["turn", "torque at"]),
         (["--robot", "stiff.toml", "--only", "step_up"], ["step up", "knee_pitch", "range at"]),
         (["--backend", "mjx", "--device", "tpu", "--only", "stand"], ["device", "tpu", "JAX sees"]),
+        (["--against", "mjx", "--device", "tpu", "--only", "stand"], ["device", "tpu", "JAX sees"]),
+        (["--bump", "0.05", "--only", "step_up"], ["--bump", "step height, 0.03 m", "0.05"]),
+        (["--bump", "-0.01"], ["--bump", "greater than 0"]),
+        (["--gate", "0.33", "--only", "gate"], ["--gate", "squatting robot's head, 0.34 m", "0.33"]),
+        (["--robot", "high.toml", "--only", "gate"], ["--gate", "squatting robot's head, 0.375 m", "0.37"]),
     ],
 )
 def test_what_it_refuses(here, capsys, argv, said):
     (here / "tall.toml").write_text("[stance]\nstanding = 0.3\n")
+    (here / "high.toml").write_text("[stance]\nsquatting = 0.19\nclimbing = 0.19\nwalking = 0.19\n")
     (here / "weak.toml").write_text("[servo]\ntorque = 1.0\n")
     (here / "stiff.toml").write_text("[ranges]\nknee_pitch = [0.0, 60.0]\n")
     line = refused(capsys, "primitives", *argv)
@@ -89,6 +95,17 @@ def test_what_it_refuses(here, capsys, argv, said):
 def test_a_folder_that_exists(here, capsys):
     (here / "mine").mkdir()
     assert "does not exist yet" in refused(capsys, "primitives", *SMALL, "--out", "mine")
+
+
+def test_against_another_backend(here, capsys, monkeypatch):
+    """What it prints, and its status: with `native` in the place of `mjx`, which takes long."""
+    monkeypatch.setattr(primitives, "HARD_CASES", 6)
+    assert primitives.main(primitives.PrimitivesArgs.model_construct(
+        **primitives.PrimitivesArgs(pace="fast", only=("step_up",), against="mjx").model_dump() | {"against": "native"}
+    )) == 0  # fmt: skip
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "at most 0.00 mm apart" in printed and "6 hard steps up" in printed and "the same in 6" in printed
+    assert not (here / "results").exists()
 
 
 def test_the_shipped_library_is_whole():
