@@ -1,51 +1,23 @@
 """Executors play a command in the true world; the referee's rules for a nominal one.
 
 An executor is a function `(arena, world, command, settings) -> Execution`, for one arena. `kinematic` is the one that
-moves exactly as the primitives say; simulated bipeds are others.
+moves exactly as the primitives say; `sampled` moves as they were measured to; simulated bipeds are others.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
-
-import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.boxes import ground_height, plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
+from jaxbiped.mission.execution import CHECKS, ODOMETRY, TOUCH, Execution, Executor
+from jaxbiped.mission.sampled import sampled
 from jaxbiped.mission.settings import Settings
 from jaxbiped.mission.state import World
 from jaxbiped.motion.primitives import Command, duration
 from jaxbiped.sensing.hashing import fold
 from jaxbiped.sensing.odometry import drift
-
-CHECKS = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
-TOUCH = 0.002  # [m] contact that counts as none: rounding, and boxes that just end at a height
-ODOMETRY = 2  # channel of a mission's seed
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Execution:
-    """What came of one command."""
-
-    pose: Pose  # true, after it
-    moved: Float[Array, "*B 3"]  # dx, dy [m], dyaw [rad] by odometry, in the robot frame before it
-    variances: Float[Array, "*B 3"]  # of that
-    time: Float[Array, "*B"]  # [s]
-    distance: Float[Array, "*B"]  # [m]
-    collided: Bool[Array, "*B"]
-    fell: Bool[Array, "*B"]
-    outside: Bool[Array, "*B"]
-
-
-class Executor(Protocol):
-    """Plays one command of one arena."""
-
-    def __call__(self, arena: Arena, world: World, command: Command, settings: Settings) -> Execution: ...
 
 
 def kinematic(arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
@@ -93,4 +65,4 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
     )
 
 
-EXECUTORS: dict[str, Executor] = {"kinematic": kinematic}
+EXECUTORS: dict[str, Executor] = {"kinematic": kinematic, "sampled": sampled}

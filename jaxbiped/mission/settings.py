@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Literal
 
 import jax
@@ -13,6 +14,7 @@ from jaxtyping import Array, Float, Int
 from jaxbiped.config import Model
 from jaxbiped.mapping import Body, GridSpec, MapConfig, MapParams
 from jaxbiped.mission.footwork import WalkConfig
+from jaxbiped.mission.library import Library, load_library
 from jaxbiped.mission.strategies import Strategy, strategy
 from jaxbiped.motion.primitives import DurationConfig, Durations
 from jaxbiped.motion.robot import Footing, RobotConfig
@@ -67,8 +69,9 @@ class MissionConfig(Model):
     sensor: Literal["raycast", "oracle"] = "raycast"
     preset: Literal["ideal", "rendered", "real"] = "rendered"
     """How well the camera measures: the default of each number of `stereo` and `landmarks`."""
-    executor: Literal["kinematic", "native", "mjx"] = "kinematic"
-    """`native` and `mjx`: simulated bipeds, in MuJoCo's own batch or in MJX."""
+    executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
+    """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
+    MuJoCo's own batch or in MJX."""
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False
@@ -83,6 +86,8 @@ class MissionConfig(Model):
     mapping: MapConfig = MapConfig()
     limits: LimitConfig = LimitConfig()
     walk: WalkConfig = WalkConfig()
+    library: Path | None = None
+    """What `sampled` draws from, a file that `jaxbiped primitives` wrote; by default the one of the default robot."""
 
     @pydantic.model_validator(mode="before")
     @classmethod
@@ -115,6 +120,7 @@ class MissionConfig(Model):
             landmarks=self.landmarks.traced(),
             odometry=self.odometry.traced(),
             mapping=self.mapping.params(),
+            library=load_library(self.library).traced(),
             footing=self.robot.footing.traced(),
             limits=Limits(
                 goal_radius=jnp.float32(limits.goal_radius),
@@ -156,6 +162,7 @@ class Settings:
     landmarks: LandmarkNoise
     odometry: OdometryNoise
     mapping: MapParams
+    library: Library
     footing: Footing
     limits: Limits
 
