@@ -16,8 +16,8 @@ from jaxbiped.planning.costs import BASE_PITCH, DIRECTIONS
 HIGHER = ((0.075, 8.0), (0.11, 5.0))
 LOWER = ((0.06, 8.0), (0.11, 3.0))  # the same when it is lower: an ankle beyond the edge has no hold
 TOES = 0.05  # [m] that a foot reaches beyond both ends of a move
-RAGGED = 0.06  # [m] beside a move over an edge, where the ground should be as at its ends
-RAGGED_COST = 3.0  # of each of the cells there that is not
+# the same beside a move over an edge, for each cell there whose ground is not as at the move's ends
+RAGGED = ((0.06, 3.0), (0.11, 1.0))
 LEAST = 1e-3  # [m]
 NOWHERE = -99  # level of what cannot be trodden on
 
@@ -66,15 +66,15 @@ def rim_costs(classes: Int[Array, "B H W"], levels: Int[Array, "B H W"], pitch: 
                 up, down = price(HIGHER, beside), price(LOWER, beside)
                 cost = jnp.where(other > level, up, jnp.where(tread & (other < level), down, 0.0))
                 surcharge = jnp.maximum(surcharge, cost)
-                if beside <= RAGGED:
+                if beside <= RAGGED[-1][0]:
                     near = level if along < 0 else there
                     odd = (
                         (tread & (other != near)) if abs(along) > LEAST else tread & (other != level) & (other != there)
                     )
-                    ragged = ragged + odd
+                    ragged = ragged + odd * price(RAGGED, beside)
             else:
                 square = (into[0] if along > 0 else into[1]) > level
                 surcharge = jnp.maximum(surcharge, jnp.where((other > level) & ~square, price(HIGHER, beside), 0.0))
         scale = length * pitch / BASE_PITCH
-        out.append(jnp.where(level_walk, surcharge * scale, jnp.where(over, ragged * RAGGED_COST, 0.0)))
+        out.append(jnp.where(level_walk, surcharge * scale, jnp.where(over, ragged, 0.0)))
     return jnp.stack(out, axis=1)

@@ -8,7 +8,7 @@ import pytest
 
 from jaxbiped import planning
 from jaxbiped.mapping import Cell
-from jaxbiped.planning.rims import HIGHER, LOWER, RAGGED, RAGGED_COST, TOES, rim_costs
+from jaxbiped.planning.rims import HIGHER, LOWER, RAGGED, TOES, rim_costs
 
 DIRECTIONS = [tuple(int(d) for d in direction) for direction in planning.DIRECTIONS]
 
@@ -31,7 +31,7 @@ def plain(classes, levels, pitch):
             here, there = ground(i, j), ground(i + di, j + dj)
             if here is None or there is None:
                 continue
-            walk, ragged = 0.0, 0
+            walk, ragged = 0.0, 0.0
             for a, b in np.ndindex(15, 15):
                 oi, oj = a - 7, b - 7
                 other = ground(i + oi, j + oj)
@@ -47,10 +47,10 @@ def plain(classes, levels, pitch):
                     continue
                 if other != here:
                     walk = max(walk, price(HIGHER if other > here else LOWER, beside))
-                if beside <= RAGGED:
+                if beside <= RAGGED[-1][0]:
                     near = {here} if along < -1e-3 else {there} if along > 1e-3 else {here, there}
-                    ragged += other not in near
-            out[k, i, j] = walk * length * pitch / 0.05 if here == there else ragged * RAGGED_COST
+                    ragged += price(RAGGED, beside) * (other not in near)
+            out[k, i, j] = walk * length * pitch / 0.05 if here == there else ragged
     return out
 
 
