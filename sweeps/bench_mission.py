@@ -114,8 +114,7 @@ def parts(repeats: int = 20):
         heading = jax.vmap(decision.nearest_direction)(yaw)
         return planning.next_step(cost, classes, levels, costs, rules, ij, heading)
 
-    def choose(*arguments):
-        return jax.vmap(partial(decision.choose, spec=spec))(*arguments)
+    choose = jax.vmap(partial(decision.choose, program=PROGRAM))
 
     def execute(world, mind, command, verdict):
         done = jax.vmap(kinematic)(batch, world, command, setting)
@@ -129,15 +128,16 @@ def parts(repeats: int = 20):
         print(f"  {name:8s} {taken / SLOTS * 1e6:7.1f} us a decision")
         return result
 
-    print(f"parts, {SLOTS} missions at once, one after the other (XLA may use all cores here):")
-    view, sightings = part("sense", jax.vmap(partial(sense, program=PROGRAM)), world, mind, batch, setting)
+    print(f"parts, {SLOTS} missions at once, each alone, in memory that is new at each call:")
+    measure = jax.vmap(partial(sense, program=PROGRAM, carriage=None))
+    view, sightings = part("sense", measure, world, mind, batch, setting)
     perceive = partial(decision.perceive, program=PROGRAM)
     mind, classes, levels, ij = part("map", perceive, mind, view, sightings, batch, setting)
     goal_ij = jax.vmap(partial(goal_cell, spec=spec))(
         batch.goal_xy, setting.limits.goal_radius, classes, setting.strategy.rules()
     )
     moves = part("plan", plan, classes, levels, ij, goal_ij, mind.belief.pose.yaw)
-    arguments = (mind, ij, goal_ij, moves, classes, levels, blind)
+    arguments = (mind, view, ij, goal_ij, moves, classes, levels, blind, setting)
     mind, command, verdict = part("select", choose, *arguments)
     part("execute", execute, world, mind, command, verdict)
     part("all", partial(cycle, program=PROGRAM), world, mind, batch, setting)
