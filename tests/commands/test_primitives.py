@@ -13,7 +13,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.library import DEFAULT, PLAYED, LibraryConfig, load_library
 from jaxbiped.physics.spread import SETS
 from jaxbiped.report import video
-from tests.commands.test_cli import here, refused
+from tests.commands.test_cli import SCENE, here, refused
 
 __all__ = ["here"]
 SMALL = ["--pace", "fast", "--draws", "4", "--only", "step_up", "stand"]
@@ -106,6 +106,11 @@ def test_against_another_backend(here, capsys, monkeypatch):
     printed = " ".join(capsys.readouterr().out.split())
     assert "at most 0.00 mm apart" in printed and "6 hard steps up" in printed and "the same in 6" in printed
     assert not (here / "results").exists()
+
+
+def test_a_library_that_is_not_there(here, capsys):
+    line = refused(capsys, "run", SCENE, "--executor", "sampled", "--library", "missing.toml")
+    assert "missing.toml" in line and "no such file" in line
 
 
 def test_the_shipped_library_is_whole():
