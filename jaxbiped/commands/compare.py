@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing
-from jaxbiped.mission.settings import program
+from jaxbiped.mission.settings import SIMULATED, program
 from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import terminal
 from jaxbiped.study import store
@@ -43,6 +43,10 @@ def main(args: CompareArgs) -> int:
     """
     config = StudyConfig.model_validate(args.model_dump(exclude={"out"}))
     program(config.mission, (SIZE_X, SIZE_Y))  # refuses what does not fit before anything is written
+    if config.mission.executor in SIMULATED:
+        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+
+        rehearse(config.mission)
     out = args.out or Path("results") / f"compare-{config_hash(config)}"
     refuse_existing(out)
     console = Console()

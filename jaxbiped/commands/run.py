@@ -46,20 +46,22 @@ def main(args: RunArgs) -> int:
       Exit status: 0 when the goal was reached, else 1.
 
     Raises:
-      InputError: a bad scene, a pitch that does not divide its area, a folder that exists or cannot be written.
+      InputError: a bad scene, a pitch that does not divide its area, a biped that cannot be simulated, a folder that
+        exists or cannot be written.
     """
     identity = config_hash(args.model_copy(update={"out": None}))
     out = args.out or Path("results") / f"run-{args.scene.stem}-{args.strategy}-{identity}"
     refuse_existing(out)
     name, arena = load_scene(args.scene)
     static = program(args.mission, tuple(round(float(v), 6) for v in arena.size_xy))
-    print(f"{name}, {args.strategy}, sensor {args.mission.sensor}, executor {args.mission.executor}, seed {args.seed}")
-    print("   time   turn   ahead  primitive")
     play = run_logged
     if args.mission.executor in SIMULATED:
-        from jaxbiped.mission.walking import walk_logged
+        from jaxbiped.mission.walking import rehearse, walk_logged  # loads MuJoCo
 
+        rehearse(args.mission)
         play = partial(walk_logged, config=args.mission.walk)
+    print(f"{name}, {args.strategy}, sensor {args.mission.sensor}, executor {args.mission.executor}, seed {args.seed}")
+    print("   time   turn   ahead  primitive")
     mission = play(
         arena,
         args.mission.settings(args.strategy),

@@ -8,6 +8,7 @@ depends, bit for bit, neither on the number of slots, nor on its neighbours or i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Protocol, runtime_checkable
 
@@ -16,22 +17,28 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
+from jaxbiped import physics
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mapping import GridSpec
 from jaxbiped.mission.decision import Thought
-from jaxbiped.mission.footwork import Move, WalkConfig, requests, targets
+from jaxbiped.mission.footwork import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
 from jaxbiped.mission.judging import Plan, choose_rows, fresh, gather, judge_and_think, no_plan, scatter
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, Result
-from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.stage import Stage
 from jaxbiped.mission.state import Carriage, Mind, World, start
 from jaxbiped.mission.stepped import Mission, Played, Recorder
 from jaxbiped.motion.gait import TIMESTEP
-from jaxbiped.motion.primitives import Command, Primitive
+from jaxbiped.motion.primitives import CELL, Command, Primitive
+from jaxbiped.physics.robot import robot_spec
 
 SLICE = 32  # steps (0.16 s) between two looks at who is done
 SETTLE = 0.3  # [s] that a robot stands before it measures
+LEVEL = GridSpec().level_height  # [m]
+HEADROOM = 1e-4  # [m] that the simulated head may be higher than the map's, by rounding
 ROWS = 8  # robots that decide in one call: the same program, whatever the number of slots
 
 
@@ -84,6 +91,29 @@ def walk_logged(
     recorder = Recorder(settings, program, on_decision)
     walk(arenas, points, Jobs(zero, zero, jnp.asarray(seed)[None], jnp.int32(1)), program, config, observer=recorder)
     return recorder.mission(arena, world)
+
+
+def rehearse(config: MissionConfig) -> None:
+    """Refuse what cannot be simulated, before anything is written, printed or compiled at length.
+
+    Raises:
+      InputError: a device or a package that is not there, a biped that cannot play its primitives, or one that is
+        higher than the robot that the map is made for.
+    """
+    if config.executor not in SIMULATED:
+        return
+    walk, robot = config.walk, config.robot
+    for stance, height in (("standing", walk.biped.head_standing), ("squatting", walk.biped.head_squatting)):
+        if getattr(robot, stance) < height - HEADROOM:
+            message = f"must be at least the height of the simulated biped, {height:.3f} m"
+            raise InputError(message, field=f"robot.{stance}", value=getattr(robot, stance))
+    for squat, primitive in ((False, Primitive.STRAIGHT_FORWARD), (True, Primitive.PASS_GATE)):
+        for request in requests(Move(math.pi / 4, primitive, CELL, 0, squat), not squat, LEVEL, walk.pace):
+            targets(request, walk.biped)
+    for rise, primitive in ((1, Primitive.STEP_UP_BUMP), (-1, Primitive.STEP_DOWN_BUMP)):
+        for request in requests(Move(0.0, primitive, FURTHEST_CLIMB, rise, False), False, LEVEL, walk.pace):
+            targets(request, walk.biped)
+    physics.make(config.executor, robot_spec(walk.biped), 1, **walk.options(config.executor))
 
 
 class Walkers:

@@ -26,7 +26,6 @@ from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import SLOTS, Jobs, Result, compile_queue, stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program
-from jaxbiped.mission.walking import WalkConfig, walk
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.schema import FAMILIES, SCENE, SCHEMA, STRATEGIES
 
@@ -86,7 +85,11 @@ def evaluate(config: StudyConfig, on_progress: Callable[[Progress], None] | None
             if on_progress:
                 on_progress(Progress(before + ended, total))
 
-        play = partial(walk_all, config=config.mission.walk) if static.executor in SIMULATED else run_all
+        play = run_all
+        if static.executor in SIMULATED:
+            from jaxbiped.study.walks import walk_all  # loads MuJoCo
+
+            play = partial(walk_all, config=config.mission.walk)
         result = play(batch, seeds, points, count, static, report)
         plan = oracle_plan(batch, points, static)
         index = np.arange(first, first + count)
@@ -155,23 +158,6 @@ def run_all(
         for all_rows, rows in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):
             all_rows[point[mine], arena[mine]] = rows[: len(mine)]
     return out
-
-
-def walk_all(
-    batch: Arena,
-    seeds: UInt32[Array, "A"],
-    points: Settings,
-    count: int,
-    static: Program,
-    on_progress: Callable[[int], None],
-    config: WalkConfig,
-) -> Result:
-    """As `run_all`, by simulated bipeds."""
-    kinds = jax.tree.leaves(points)[0].shape[0]
-    point, arena = (grid.ravel() for grid in np.meshgrid(np.arange(kinds), np.arange(count), indexing="ij"))
-    jobs = Jobs(jnp.asarray(arena), jnp.asarray(point), seeds[arena], jnp.int32(len(arena)))
-    result = walk(batch, points, jobs, static, config, on_progress)
-    return jax.tree.map(lambda leaf: leaf.reshape(kinds, count), result)
 
 
 def frame(

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.arenas.scene import BoxConfig, SceneConfig, to_arena
+from jaxbiped.arenas.scene import BoxConfig, SceneConfig, load_scene, to_arena
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.judging import carried_out
@@ -153,3 +153,13 @@ def test_mjx_reaches_the_goals_too(together):
     result = play([0, 1, 2], 3, config)
     np.testing.assert_array_equal(result.code, together.code)
     np.testing.assert_allclose(result.distance, together.distance, atol=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [1, 2, 3, 4, 5, 6])
+def test_the_papers_experiments_are_solved_without_a_fall_or_a_touch(number, request):
+    _, scene = load_scene(request.config.rootpath / f"configs/scenes/experiment_{number}.toml")
+    config = MissionConfig(executor="native")
+    settings = config.settings("floor_only" if number == 4 else "full")
+    static = program(config, tuple(round(float(v), 6) for v in scene.size_xy))
+    assert walk_logged(scene, settings, jnp.uint32(0), static, config.walk).code == Code.REACHED
