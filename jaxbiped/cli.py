@@ -11,6 +11,7 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import get_args
 
 import pydantic
 
@@ -68,9 +69,12 @@ def dispatch(name: str, rest: list[str]) -> int:
     extra = {}
     path = Path(rest.pop(0)) if takes_file and rest and not rest[0].startswith("-") else None
     data = load_toml(path) if path else {}
-    if "mission" in options.model_fields and "--preset" in rest[:-1]:
-        # The preset decides the defaults of other options, so that it must be known before they are read.
-        data = data | {"mission": data.get("mission", {}) | {"preset": rest[rest.index("--preset") + 1]}}
+    for option in ("preset", "executor"):
+        # They decide the defaults of other options, so that they must be known before those are read.
+        if "mission" in options.model_fields and f"--{option}" in rest[:-1]:
+            value, known = rest[rest.index(f"--{option}") + 1], options.model_fields["mission"].annotation.model_fields
+            if value in get_args(known[option].annotation):
+                data = data | {"mission": data.get("mission", {}) | {option: value}}
     if data or path:
         required = {name for name, field in options.model_fields.items() if field.is_required()}
         known = parse(options, data | dict.fromkeys(required, "-"), file=path)

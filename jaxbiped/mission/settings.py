@@ -27,6 +27,8 @@ from jaxbiped.sensing.presets import PRESETS
 
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
+SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinematic`: a walking biped sways, and its
+# stereo camera, as wide as the body, sweeps 12 cm to either side
 SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 
 # Bounded so that sums of costs along a path keep their differences in single precision.
@@ -92,7 +94,10 @@ class MissionConfig(Model):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _fill_in(cls, data):
-        """What is not given comes from the preset, field by field."""
+        """What is not given comes from the preset, field by field; the radius depends on who walks."""
+        if isinstance(data, dict) and data.get("executor", "kinematic") != "kinematic":
+            robot = data.get("robot", {})
+            data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
         preset = PRESETS.get(data.get("preset", "rendered")) if isinstance(data, dict) else None
         if preset is None:
             return data

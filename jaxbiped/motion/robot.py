@@ -67,7 +67,8 @@ class RobotConfig(Model):
     """A biped as an upright cylinder that can squat (paper, 2.2, Fig. 4); by default the e-nuvo WALK of the paper."""
 
     radius: Annotated[float, pydantic.Field(gt=0.0, le=0.15)] = 0.10
-    """[m] of the cylinder that obstacles are grown by: the body, and a margin for pose errors."""
+    """[m] of the cylinder that obstacles are grown by: the body, and a margin for pose errors. With simulated bipeds,
+    which sway as they walk, 0.125 by default."""
     body_radius: Annotated[float, pydantic.Field(gt=0.0, le=0.15)] = 0.08
     """[m] of the cylinder that really collides."""
     standing: Length = 0.385

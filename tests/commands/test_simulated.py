@@ -7,6 +7,9 @@ import polars as pl
 import pytest
 
 from jaxbiped import cli
+from jaxbiped.commands import run
+from jaxbiped.mission.settings import SWAYING, MissionConfig
+from jaxbiped.motion.robot import RobotConfig
 
 SCENE = """
 name = "short"
@@ -49,6 +52,16 @@ def test_what_cannot_be_simulated_is_refused_with_one_line(scene, capsys, tmp_pa
     assert len(lines) == 1 and lines[0].startswith("jaxbiped: ")
     assert all(part in lines[0] for part in said), lines[0]
     assert not (tmp_path / "out").exists()
+
+
+def test_who_sways_keeps_further_off_by_default(scene, monkeypatch):
+    seen = []
+    monkeypatch.setattr(run, "main", lambda args: seen.append(args.mission.robot.radius) or 0)
+    for options in ([], ["--executor", "native"], ["--executor", "native", "--robot.radius", "0.11"]):
+        assert cli.main(["run", scene, *options]) == 0
+    assert seen == [0.10, SWAYING, 0.11]
+    assert MissionConfig(executor="mjx", robot={"standing": 0.39}).robot.radius == SWAYING
+    assert MissionConfig(executor="native", robot=RobotConfig()).robot.radius == RobotConfig().radius
 
 
 def missing(package):
