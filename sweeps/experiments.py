@@ -1,16 +1,19 @@
 """The six experiments of the paper, ours beside the paper's figures where it gives any (Tables 3 and 4).
 
-    python sweeps/experiments.py [--seeds N]
+    python sweeps/experiments.py [--seeds N] [--executor kinematic|sampled|native|mjx]
 
-Each scene is run with several noise seeds; printed are how many reached, and the median distance and time of those.
+Each scene is run with several noise seeds; printed are how the missions ended, and the median distance and time of
+those that reached the goal.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import tyro
 from rich.console import Console
@@ -18,9 +21,11 @@ from rich.table import Table
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.stepped import run_logged
+from jaxbiped.mission.queue import stack
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing.hashing import from_key
+from jaxbiped.study.evaluate import run_all
+from jaxbiped.study.walks import walk_all
 
 SCENES = Path(__file__).parent.parent / "configs" / "scenes"
 
@@ -45,23 +50,36 @@ EXPERIMENTS = (
 )
 
 
-def main(seeds: int = 8) -> None:
+def play(item: Experiment, config: MissionConfig, seeds: int):
+    """All missions of one experiment, at once: `Result` with leaves [seeds]."""
+    _, arena = load_scene(SCENES / f"experiment_{item.number}.toml")
+    static = program(config, tuple(round(float(v), 6) for v in arena.size_xy))
+    batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (seeds, *jnp.shape(leaf))), arena)
+    noise = jnp.stack([from_key(jax.random.key(seed)) for seed in range(seeds)])
+    points = stack([config.settings(item.strategy)])
+    if config.executor in SIMULATED:
+        result = walk_all(batch, noise, points, seeds, static, lambda _: None, config.walk)
+    else:
+        result = run_all(batch, noise, points, seeds, static, lambda _: None, workers=1, slots=seeds)
+    return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
+
+
+def main(seeds: int = 8, executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic") -> None:
     """Run all six with `seeds` noise seeds each."""
-    table = Table("experiment", "strategy", "reached", "distance", "paper", "time", "paper", title="Medians over seeds")
-    config = MissionConfig()
+    columns = "experiment", "strategy", "ended", "distance", "paper", "time", "paper"
+    table = Table(*columns, title=f"Medians over {seeds} seeds, executor {executor}")
+    config = MissionConfig(executor=executor)
     for item in EXPERIMENTS:
-        _, arena = load_scene(SCENES / f"experiment_{item.number}.toml")
-        static = program(config, tuple(round(float(v), 6) for v in arena.size_xy))
-        settings = config.settings(item.strategy)
-        ends = [run_logged(arena, settings, from_key(jax.random.key(seed)), static) for seed in range(seeds)]
-        reached = [end for end in ends if end.code == Code.REACHED]
+        result = play(item, config, seeds)
+        kinds, counts = np.unique(result.code, return_counts=True)
+        reached = result.code == Code.REACHED
         table.add_row(
             str(item.number),
             item.strategy,
-            f"{len(reached)} of {seeds}",
-            f"{100 * np.median([end.distance for end in reached]):.0f} cm" if reached else "-",
+            ", ".join(f"{count} {Code(int(kind)).label}" for kind, count in zip(kinds, counts, strict=True)),
+            f"{100 * np.median(result.distance[reached]):.0f} cm" if reached.any() else "-",
             f"{100 * item.distance:.0f} cm" if item.distance else "-",
-            f"{np.median([end.time for end in reached]) / 60:.1f} min" if reached else "-",
+            f"{np.median(result.time[reached]) / 60:.1f} min" if reached.any() else "-",
             f"{item.minutes:.1f} min" if item.minutes else "-",
         )
     Console().print(table)
