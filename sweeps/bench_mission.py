@@ -7,12 +7,12 @@
 Both sides use the whole machine, with two threads and two processes, on the same arenas and strategies; compile time
 is apart. The compiled side works the list of missions off several times over, as a study has many.
 
-Measured on two virtual cores of an AMD EPYC, otherwise idle, jax 0.10.2, three runs of the command:
-  compiled 524 to 584 missions/s (11,900 to 13,200 decisions/s) against 11.8 to 13.0 of the reference: ratios of 44
-  to 45, by rounds 40 to 51, 45 by CPU seconds. Short of the 50 that were aimed at. The same code and number of
-  decisions in all of 100 missions. 11 s of compiling.
-  A decision: sense 25 us, map 54 to 72, plan 8 to 10, select 4 to 8, execute 3 to 7. The reference: 4.2 ms, 3.7, 1.9
-  and 0.7. The whole cycle takes about 60 us of one core more than its parts do alone; why, is not found yet.
+Measured on two virtual cores of an AMD EPYC, jax 0.10.2, runs of the command beside little other load:
+  compiled 643 to 657 missions/s (14,500 to 14,800 decisions/s) against 11.1 to 12.4 of the reference: ratios of 52 to
+  59, by rounds 48 to 59, 52 to 54 by CPU seconds. The same code and number of decisions in all of 100 missions. 18 s of
+  compiling.
+  A decision, each part alone: sense 24 us, map 57, plan 7, select 5, execute 5. The reference: 3.2 ms, 2.5, 1.4, and
+  0.5 for the last two.
   --stream: 2,048 arenas in shards of 1,024 peak at 2.67 GiB, 8,192 at 2.64 GiB.
   --sweep: 20 traces and 19 compilations for the first cost vector, none for the 64 that follow.
 """

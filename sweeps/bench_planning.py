@@ -9,16 +9,15 @@ and finds one path, not the field; scipy is timed with its graph already built, 
 apart. Ours starts from class grids and ends with the field and the next step of every arena. Each figure is
 the least of several repeats, taken in turns, so that other load on the machine meets all sides alike.
 
-Measured on 2 virtual cores of an AMD EPYC (AVX-512, 1 MiB L2 a core) with jax 0.10.2, three runs at a load of 2 to
-3.4 from other work, when two busy processes together got 1 to 1.3 times what one gets alone: only ratios mean
-anything, and even they swing from run to run. "x" is the peer's time over ours. 4,096 maps of 28 x 36, 7.7 to 11 us
-a map: 2.4 to 3.1x pyastar2d, 7 to 12x Dijkstra, 22 to 35x Dijkstra and its graph; the compiled program alone takes
-6.5 us of one core a map. 512 maps of 140 x 180: 1.1 to 1.6x, 6.6 to 8.5x and 17 to 21x. One map of 512 x 512: open
-2.5 to 3.0x, rooms 1.0 to 1.3x, maze 0.29 to 0.36x, maze with loops 0.45 to 0.51x. Slow: cells thrown at random,
-0.13 to 0.15x.
-Short of their targets: 28 x 36 (5x pyastar2d, 20x Dijkstra) and pyastar2d on 140 x 180 (2x); on the edge: the maze
-(a third). What limits: on 28 x 36 a chunk of 80 arenas, the fewest that compilers vectorise, is twice the L2 cache;
-on 140 x 180 far more.
+Measured on 2 virtual cores of an AMD EPYC (AVX-512, 1 MiB L2 a core), jax 0.10.2, numba 0.68.1, two runs with little
+other load and three beside busy processes, which moves the ratios by a third. "x" is the peer's time over ours.
+4,096 maps of 28 x 36, 6.0 to 7.4 us a map: 2.4 to 2.8x pyastar2d, 7.7 to 9.4x Dijkstra, 23 to 28x Dijkstra and its
+graph. 512 maps of 140 x 180, 191 to 216 us: 1.5 to 2.2x, 6.5 to 8.0x, 18 to 21x. One map of 512 x 512: open 1.1 to
+1.2x, rooms 1.2x, maze 0.66 to 0.70x, maze with loops 0.75 to 0.81x, cells thrown at random 1.1x.
+The first call compiles for 4 to 6 s, most of it in Numba.
+Short of their targets: pyastar2d on 28 x 36 (5x) and on 140 x 180 (2x). What a map of 28 x 36 costs on one core, pinned:
+5.0 us, of which the sweeps 1.5, the costs of its edges about 1.7, and turning maps to batches and back 1.5; and 1.3 more
+for threads and copies. On 140 x 180 the edges of 16 maps do not fit the cache.
 """
 
 from __future__ import annotations
