@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.geometry.pose import Pose, to_robot, wrap_angle
+from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
+from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.cycle import conclude, think
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.executors import ODOMETRY, Execution
+from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, begin, pick
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
-from jaxbiped.motion.primitives import Command, duration
+from jaxbiped.motion.primitives import Command, Primitive, duration
+from jaxbiped.motion.selection import cell_of
 from jaxbiped.sensing.hashing import fold
 from jaxbiped.sensing.odometry import drift
+
+HINDERED, TWISTED = 0.02, 0.1  # [m, rad] off where a command leads: something was in the way
+PATIENCE = 2  # commands in a row that were hindered before the robot believes its feet
+TOUCH_VOTES = 1e5  # [px] what feet felt outvotes all that was seen
+BACK = 0.04  # [m] of a step backward
 
 
 @jax.tree_util.register_dataclass
@@ -30,12 +38,13 @@ class Plan:
     command: Command
     verdict: Int[Array, "*B"]
     some: Bool[Array, "*B"]  # False before the first decision
+    hindered: Int[Array, "*B"]  # commands before this one, in a row, that something was in the way of
 
 
 def no_plan(size: int) -> Plan:
     """Before the first decision."""
     zero, whole, no = jnp.zeros(size), jnp.zeros(size, jnp.int32), jnp.zeros(size, bool)
-    return Plan(Command(turn=zero, primitive=whole, length=zero, rise=whole, squat=no, left=zero), whole, no)
+    return Plan(Command(turn=zero, primitive=whole, length=zero, rise=whole, squat=no, left=zero), whole, no, whole)
 
 
 @jax.jit
@@ -77,6 +86,9 @@ def judge_and_think(
 ) -> tuple[World, Mind, Mind, Plan, Thought]:
     """The referee looks at what came of each robot's plan, and each robot makes its next one.
 
+    Deviation: the paper's robot knows nothing but what it sees. Here, feet that were stopped `PATIENCE` times in a row,
+    by an edge that the map has elsewhere, make the robot step back and plan round that cell.
+
     Returns:
       The world and the mind after what was done; the mind after the next measurement; the next plan; the thought.
     """
@@ -84,9 +96,54 @@ def judge_and_think(
     done = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, mind, plan.command, plan.verdict, executed, arena, settings, program
     )
+    times = jnp.where(plan.some & hindered(plan.command, executed.moved), plan.hindered + 1, 0)
+    stuck = times >= PATIENCE
+    felt = jax.vmap(feel, in_axes=(0, 0, 0, None))(done[1], mind.belief.pose, plan.command, program.spec)
+    done = done[0], choose_rows(stuck, felt, done[1])
     world, mind = choose_rows(plan.some, done, (world, mind))
     _, thinking, command, verdict, thought = think(world, mind, arena, settings, program, carriage)
-    return world, mind, thinking, Plan(command, verdict, jnp.ones_like(plan.some)), thought
+    command = choose_rows(stuck & (verdict == Code.RUNNING), back_off(command), command)
+    return world, mind, thinking, Plan(command, verdict, jnp.ones_like(plan.some), jnp.where(stuck, 0, times)), thought
+
+
+def hindered(command: Command, moved: Float[Array, "n 3"]) -> Bool[Array, "n"]:
+    """Whether feet were in the way of something low: by odometry [n, 3], the robot is not where its command leads.
+
+    Steps over an edge do not count, and neither does what was hindered while it backed off.
+    """
+    cos, sin = jnp.cos(command.turn), jnp.sin(command.turn)
+    x, y = command.length * cos - command.left * sin, command.length * sin + command.left * cos
+    off = jnp.hypot(moved[:, 0] - x, moved[:, 1] - y)
+    astray = jnp.abs(wrap_angle(moved[:, 2] - command.turn))
+    return ((off > HINDERED) | (astray > TWISTED)) & (command.rise == 0) & (command.length >= 0)
+
+
+def feel(mind: Mind, before: Pose, command: Command, spec: GridSpec) -> Mind:
+    """Write an obstacle into the map of one robot, at the cell where feet that were hindered should have come to stand.
+
+    If it stands in that cell, then at the cell behind it.
+    """
+    yaw = before.yaw + command.turn
+    ahead = Pose(before.x, before.y, before.z, yaw)
+    own = cell_of(mind.belief.pose.x, mind.belief.pose.y, spec)
+    there = cell_of(*to_world(ahead, command.length, command.left), spec)
+    beyond = cell_of(*to_world(ahead, command.length + spec.pitch, command.left), spec)
+    i, j = jnp.where(jnp.all(there == own), beyond, there)
+    votes = mind.grid_map.votes.at[i, j, Cell.OBSTACLE - 1].add(TOUCH_VOTES)
+    return replace(mind, grid_map=replace(mind.grid_map, votes=votes))
+
+
+def back_off(command: Command) -> Command:
+    """A step backward instead of what was decided."""
+    zero, whole = jnp.zeros_like(command.length), jnp.zeros_like(command.primitive)
+    return Command(
+        turn=zero,
+        primitive=whole + Primitive.STRAIGHT_FORWARD,
+        length=zero - BACK,
+        rise=whole,
+        squat=command.squat,
+        left=zero,
+    )
 
 
 def carried_out(
