@@ -1,5 +1,10 @@
 """Edge costs and fields against plain loops and scipy's Dijkstra."""
 
+import importlib
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +16,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from tests.planning import oracle
 
+settle = importlib.import_module("jaxbiped.planning.compiled.settle")
 H, W, B = 9, 11, 150  # 150: more than one chunk, and not a multiple of it
 SEEN = range(0, B, 6)  # arenas compared with the plain loops, which take most of the time
 METHODS = ["line_sweep", "dijkstra", "wavefront"]
@@ -182,3 +188,19 @@ def test_few_and_many_large_maps_agree():
     # a batch of many goes another way, to the same numbers
     many = planning.cost_to_go(edges[[0] * 20], goal_ij[[0] * 20], method="line_sweep")
     np.testing.assert_array_equal(many.cost[7], out.cost[0])
+
+
+def test_threads_that_begin_together_compile_a_kernel_once(monkeypatch):
+    """Each would register its own under the same name, and the one that XLA calls might be thrown away."""
+    calls = []
+
+    @cache
+    def slow(method, double):
+        calls.append(method)
+        time.sleep(0.1)
+        return method, 1
+
+    monkeypatch.setattr(settle, "registered", slow)
+    with ThreadPoolExecutor(4) as pool:
+        found = set(pool.map(lambda _: settle.target("line_sweep", False), range(4)))
+    assert found == {("line_sweep", 1)} and calls == ["line_sweep"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from threading import Lock
 
 import jax
 import jax.numpy as jnp
@@ -56,8 +57,17 @@ def solver(settle, lanes: int, dtype):
 METHODS = ("line_sweep", "dijkstra")
 
 
-@cache
 def target(method: str, double: bool) -> tuple[str, int]:
+    """`registered`, by one thread at a time: XLA holds the address of what was registered first."""
+    with LOCK:
+        return registered(method, double)
+
+
+LOCK = Lock()
+
+
+@cache
+def registered(method: str, double: bool) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call. "dijkstra" is always float64."""
     name = f"jaxbiped_{method}_{'float64' if double else 'float32'}"
     lanes = (line_sweep.LANES_LARGE if double else line_sweep.LANES) if method == "line_sweep" else 1
