@@ -15,9 +15,9 @@ other load and three beside busy processes, which moves the ratios by a third. "
 graph. 512 maps of 140 x 180, 191 to 216 us: 1.5 to 2.2x, 6.5 to 8.0x, 18 to 21x. One map of 512 x 512: open 1.1 to
 1.2x, rooms 1.2x, maze 0.66 to 0.70x, maze with loops 0.75 to 0.81x, cells thrown at random 1.1x.
 The first call compiles for 4 to 6 s, most of it in Numba.
-Short of their targets: pyastar2d on 28 x 36 (5x) and on 140 x 180 (2x). What a map of 28 x 36 costs on one core, pinned:
-5.0 us, of which the sweeps 1.5, the costs of its edges about 1.7, and turning maps to batches and back 1.5; and 1.3 more
-for threads and copies. On 140 x 180 the edges of 16 maps do not fit the cache.
+Short of their targets: pyastar2d on 28 x 36 (5x) and on 140 x 180 (2x). What a map of 28 x 36 costs on one core,
+pinned: 5.0 us, of which the sweeps 1.5, the costs of its edges about 1.7, and turning maps to batches and back 1.5; and
+1.3 more for threads and copies. On 140 x 180 the edges of 16 maps do not fit the cache.
 """
 
 from __future__ import annotations
