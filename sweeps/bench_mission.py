@@ -13,8 +13,8 @@ Measured on two virtual cores of an AMD EPYC, jax 0.10.2, runs of the command be
   compiling.
   A decision, each part alone: sense 24 us, map 57, plan 7, select 5, execute 5. The reference: 3.2 ms, 2.5, 1.4, and
   0.5 for the last two.
-  --stream: 2,048 arenas in shards of 1,024 peak at 2.67 GiB, 8,192 at 2.64 GiB.
-  --sweep: 20 traces and 19 compilations for the first cost vector, none for the 64 that follow.
+  --stream: 2,048 arenas in shards of 1,024 peak at 2.88 GiB, 8,192 at 2.90 GiB.
+  --sweep: 28 traces and 27 compilations for the first cost vector, none for the 64 that follow.
 """
 
 from __future__ import annotations
