@@ -1,0 +1,128 @@
+"""The cost of the best path as a function of the costs C0 to C4, with its gradient."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxbiped.planning.costs import FORBIDDEN, IN_GATE, LEVEL, STEP, UNMEASURED, Costs, Rules, edge_costs
+from jaxbiped.planning.field import field
+from jaxbiped.planning.path import Path, read_path
+
+KIND = Costs(c0=0.0, c1=float(LEVEL), c2=float(IN_GATE), c3=float(STEP), c4=float(UNMEASURED))
+"""Under these costs a move costs what it is."""
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class MoveCounts:
+    """The moves of a path, by their shape and again by their kind. A path that is not valid has none."""
+
+    straight: Int[Array, "B"]
+    oblique: Int[Array, "B"]
+    level: Int[Array, "B"]  # on one level
+    gate: Int[Array, "B"]  # into, in and out of a gate
+    step: Int[Array, "B"]  # one level up or down
+    unmeasured: Int[Array, "B"]
+    valid: Bool[Array, "B"]
+
+    def per_cost(self) -> Costs:
+        """How often each cost is paid: the gradient of the path's cost (paper, Eq. 1). Leaves [B], float32."""
+        single = jax.tree.map(lambda n: n.astype(jnp.float32), replace(self, valid=None))
+        return Costs(
+            single.straight + math.sqrt(2.0) * single.oblique, single.level, single.gate, single.step, single.unmeasured
+        )
+
+
+def move_counts(
+    path: Path,
+    classes: Int[Array | np.ndarray, "B H W"],
+    levels: Int[Array | np.ndarray, "B H W"],
+    rules: Rules | None = None,
+) -> MoveCounts:
+    """What the moves of paths over class grids are; arguments as those of `field` and `read_path`."""
+    kinds = edge_costs(classes, levels, KIND, rules)
+    moves = (path.directions >= 0) & path.valid[:, None]
+    ij, direction = jnp.where(moves[..., None], path.cells_ij[:, :-1], 0), jnp.maximum(path.directions, 0)
+    kind = kinds[jnp.arange(len(ij))[:, None], direction, ij[..., 0], ij[..., 1]]
+    kind, oblique = jnp.where(moves, kind, FORBIDDEN), direction % 2 == 1
+
+    def count(what):
+        return jnp.sum(moves & what, axis=1, dtype=jnp.int32)
+
+    by_kind = (count(kind == k) for k in (LEVEL, IN_GATE, STEP, UNMEASURED))
+    return MoveCounts(count(~oblique), count(oblique), *by_kind, path.valid)
+
+
+def path_cost(
+    costs: Costs,
+    classes: Int[Array | np.ndarray, "B H W"],
+    levels: Int[Array | np.ndarray, "B H W"],
+    rules: Rules | None = None,
+    *,
+    start_ij: Int[Array | np.ndarray, "B 2"],
+    goal_ij: Int[Array | np.ndarray, "B 2"],
+    heading: Int[Array | np.ndarray, "B"] | None = None,
+    max_length: int | None = None,
+) -> Float[Array, "B"]:
+    """The cost of the best path of each arena (paper, Eq. 1), which `jax.grad` takes by the costs.
+
+    The cost of one path is linear in C0 to C4, and counts how often each is paid. The least over all paths is
+    therefore concave and piecewise linear in them, and where one path is the best, its counts are the gradient
+    (the envelope theorem). They are read off that path; the relaxation that found it is not unrolled. Where several
+    paths are equally good there is a kink; the counts are then those of the path that `path.pick`'s rule for ties
+    takes, which is a supergradient: f(c') <= f(c) + counts . (c' - c) for all c', up to `path.TIE` of f(c).
+
+    By everything else the gradient is zero. There is no forward mode, and C0 must be positive: moves that cost nothing
+    may be left out of the counts.
+
+    Args:
+      costs: scalars or [B] leaves.
+      classes, levels, rules, goal_ij: as of `field`.
+      start_ij, heading: as of `read_path`.
+      max_length: static; longer paths count as none. By default no path is too long.
+
+    Returns:
+      inf where there is no way; the gradient there is zero.
+    """
+    classes, levels = jnp.asarray(classes), jnp.asarray(levels)
+    batch, height, width = classes.shape
+    each = jax.tree.map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf, jnp.float32), (batch,)), costs)
+    heading = jnp.full(batch, -1) if heading is None else jnp.asarray(heading)
+    length = height * width - 1 if max_length is None else max_length
+    fixed = classes, levels, rules or Rules(), jnp.asarray(start_ij), jnp.asarray(goal_ij), heading
+    return least(each, fixed, length)
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(2,))
+def least(costs: Costs, fixed, length: int) -> Float[Array, "B"]:
+    """`path_cost` with [B] costs, and all that it is not differentiated by in one tuple."""
+    return solve(costs, fixed, length).cost
+
+
+def solve(costs: Costs, fixed, length: int) -> Path:
+    """The best path; its cost is inf where it is not valid."""
+    classes, levels, rules, start_ij, goal_ij, heading = fixed
+    to_go = field(classes, levels, costs, rules, goal_ij)
+    path = read_path(to_go, edge_costs(classes, levels, costs, rules), start_ij, length, heading)
+    return replace(path, cost=jnp.where(path.valid, path.cost, jnp.inf))
+
+
+def forward(costs: Costs, fixed, length: int) -> tuple[Float[Array, "B"], Costs]:
+    """The cost, and what the reverse pass needs: its gradient."""
+    path = solve(costs, fixed, length)
+    return path.cost, move_counts(path, *fixed[:3]).per_cost()
+
+
+def reverse(length: int, paid: Costs, cotangent: Float[Array, "B"]):
+    """The cotangents of the costs; none for the rest."""
+    return jax.tree.map(lambda n: jnp.where(n > 0, cotangent * n, 0.0), paid), None
+
+
+least.defvjp(forward, reverse)
