@@ -86,6 +86,12 @@ def kind_cost(kind: Int8[Array, "*S"], costs: Costs, oblique: bool) -> Float[Arr
     return out
 
 
+def price_list(costs: Costs) -> Float[Array, "2 K *B"]:
+    """`kind_cost` of straight and of oblique moves of every kind."""
+    kinds = [jnp.full(jnp.shape(costs.c0), k, jnp.int8) for k in range(FORBIDDEN + 1)]
+    return jnp.stack([jnp.stack([kind_cost(k, costs, oblique) for k in kinds]) for oblique in (False, True)])
+
+
 def half_edges(
     classes: Int[Array, "H W B"], levels: Int[Array, "H W B"], costs: Costs, rules: Rules
 ) -> tuple[Float[Array, "H2 W2 B"], ...]:

@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled, wavefront
-from jaxbiped.planning.costs import Costs, Rules, half_edges
+from jaxbiped.planning.costs import Costs, Rules, cell_kinds, half_edges, price_list
 
 METHODS = ("wavefront", *compiled.METHODS)
 CHUNK, CHUNK_LARGE = 32, 16  # arenas settled together, of small and of large grids: what fits the cache
@@ -80,14 +80,37 @@ def _cost_to_go(inputs, method: str) -> CostToGo:
 
 @partial(jax.jit, static_argnums=1)
 def _field(inputs, method: str) -> CostToGo:
+    if method == "line_sweep":
+        return _from_grids(*inputs)
+
     def chunk(classes, levels, each, goal):
         costs, rules = each
+        costs, valid = _checked(costs)
         last = (jnp.moveaxis(a, 0, -1) for a in (classes, levels))
-        valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)
-        costs = jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs)
         return _solve(half_edges(*last, costs, rules), goal, method, valid)
 
     return _by_chunks(chunk, inputs, _is_large(inputs[0]))
+
+
+def _from_grids(classes, levels, each, goal_ij) -> CostToGo:
+    """Line sweeps, for which the kernel itself prices the edges of a few arenas at a time."""
+    costs, rules = each
+    costs, valid = _checked(costs)
+    kinds = cell_kinds(classes, jax.tree.map(lambda leaf: jnp.asarray(leaf)[:, None, None], rules))
+    if levels.dtype != jnp.int8:
+        levels = jnp.clip(levels, -128, 127).astype(jnp.int8)
+    goal_ij = jnp.where(valid[:, None], goal_ij, -1)
+    double = _is_large(classes)
+    with jax.enable_x64(double):
+        cutting = jnp.asarray(rules.corner_cutting)
+        cost, steps = compiled.settle_grids(kinds, levels, price_list(costs), cutting, goal_ij, double)
+        return CostToGo(cost, steps, valid)
+
+
+def _checked(costs: Costs):
+    """The costs, where they are valid, else inf; and whether they are."""
+    valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)  # False for NaN as well
+    return jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs), valid
 
 
 def _method(name: str, grids) -> str:

@@ -45,6 +45,12 @@ def data(buffers, k):
 
 
 @njit
+def array(buffers, k, size, dtype):
+    """The first `size` elements of buffer number `k`, flat."""
+    return carray(pointer(data(buffers, k)), (size,), dtype)
+
+
+@njit
 def shape(buffers, k):
     """Its sizes along its axes, as many of the words as it has axes."""
     return words(words(words(buffers, k + 1)[k], BUFFER_SHAPE + 1)[BUFFER_SHAPE], 8)

@@ -13,7 +13,7 @@ from numba import njit
 from jaxbiped.planning.compiled.vector import relaxation
 from jaxbiped.planning.costs import DIRECTIONS
 
-LANES, LANES_LARGE = 32, 8  # arenas a vector, as float32 and as float64: a few of their maps fit the cache of one core
+LANES, LANES_LARGE = 32, 16  # arenas a vector, as float32 and as float64: a few of their maps fit the cache of one core
 LEFT = tuple(int(dj) for dj in DIRECTIONS[:4, 1])  # columns that the first four directions go
 
 

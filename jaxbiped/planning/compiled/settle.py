@@ -10,13 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from numba import carray, njit
 
-from jaxbiped.planning.compiled import dijkstra, foreign, line_sweep
+from jaxbiped.planning.compiled import dijkstra, foreign, grids, line_sweep
 
 
 @njit
 def edge(arguments, k, size):
     """Edge costs number `k` of the arguments, flat."""
-    return carray(foreign.pointer(foreign.data(arguments, k)), (size,), np.float32)
+    return foreign.array(arguments, k, size, np.float32)
 
 
 def solver(settle, lanes: int, dtype):
@@ -55,24 +55,29 @@ def solver(settle, lanes: int, dtype):
 
 
 METHODS = ("line_sweep", "dijkstra")
+GRIDS = "grids"  # line sweeps straight from grids
 
 
-def target(method: str, double: bool) -> tuple[str, int]:
+def target(kernel: str, double: bool) -> tuple[str, int]:
     """`registered`, by one thread at a time: XLA holds the address of what was registered first."""
     with LOCK:
-        return registered(method, double)
+        return registered(kernel, double)
 
 
 LOCK = Lock()
 
 
 @cache
-def registered(method: str, double: bool) -> tuple[str, int]:
+def registered(kernel: str, double: bool) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call. "dijkstra" is always float64."""
-    name = f"jaxbiped_{method}_{'float64' if double else 'float32'}"
-    lanes = (line_sweep.LANES_LARGE if double else line_sweep.LANES) if method == "line_sweep" else 1
-    settle = line_sweep.sweeps(lanes) if method == "line_sweep" else dijkstra.settle
-    foreign.register(name, solver(settle, lanes, np.float64 if double else np.float32))
+    name = f"jaxbiped_{kernel}_{'float64' if double else 'float32'}"
+    dtype = np.float64 if double else np.float32
+    lanes = 1 if kernel == "dijkstra" else line_sweep.LANES_LARGE if double else line_sweep.LANES
+    if kernel == GRIDS:
+        foreign.register(name, grids.solver(lanes, dtype))
+    else:
+        settle = dijkstra.settle if kernel == "dijkstra" else line_sweep.sweeps(lanes)
+        foreign.register(name, solver(settle, lanes, dtype))
     return name, lanes
 
 
@@ -95,4 +100,34 @@ def settle(edges, goal_ij, method: str, double: bool):
         jax.ShapeDtypeStruct((height, width, many), jnp.float64 if double else jnp.float32),  # room to work in
     )
     cost, steps, _ = jax.ffi.ffi_call(name, results)(*edges, goal_ij)
+    return cost[:batch], steps[:batch]
+
+
+def settle_grids(kinds, levels, prices, cutting, goal_ij, double: bool):
+    """`settle` by line sweeps, straight from grids, without ever holding the edges of more than a few arenas.
+
+    Args:
+      kinds, levels: int8 [B, H, W], of cells as `costs.cell_kinds` has them, and their heights in steps.
+      prices: float32 [2, KINDS, B], of straight and oblique moves of each kind; none may be NaN or negative.
+      cutting: bool [B], whether corners may be cut.
+    """
+    name, lanes = target(GRIDS, double)
+    batch, height, width = kinds.shape
+    many = -(-batch // lanes) * lanes
+
+    def filled(array):
+        return jnp.pad(array, ((0, many - batch),) + ((0, 0),) * (array.ndim - 1))
+
+    prices = jnp.moveaxis(filled(jnp.moveaxis(prices, -1, 0)).reshape(many // lanes, lanes, 2, grids.KINDS), 1, -1)
+    goal_ij = jnp.pad(goal_ij.astype(jnp.int32), ((0, many - batch), (0, 0)), constant_values=-1)
+    size = (height + 2) * (width + 2) * lanes
+    results = (
+        jax.ShapeDtypeStruct((many, height, width), jnp.float32),
+        jax.ShapeDtypeStruct((many,), jnp.int32),
+        jax.ShapeDtypeStruct((size,), jnp.float64 if double else jnp.float32),
+        jax.ShapeDtypeStruct((4 * size,), jnp.float32),
+        jax.ShapeDtypeStruct((2 * size,), jnp.int8),
+    )
+    arguments = filled(kinds), filled(levels), prices, filled(cutting.astype(jnp.int8)), goal_ij
+    cost, steps, *_ = jax.ffi.ffi_call(name, results)(*arguments)
     return cost[:batch], steps[:batch]
