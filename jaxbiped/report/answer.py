@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from jaxbiped.report.words import AHEAD, BEHIND, OPEN, interval, p_value, percent, signed
-from jaxbiped.study import ALL, QUESTION, Comparison, Estimate, PairComparison, PairedMetric
+from jaxbiped.study import ALL, Comparison, Estimate, PairComparison, PairedMetric
 
 ALPHA = 0.05
 
@@ -60,11 +60,12 @@ def verdict(pair: PairComparison, measure: Measure, alpha: float = ALPHA) -> str
     return AHEAD if (difference.estimate < 0) == measure.smaller_is_better else BEHIND
 
 
-def answer(comparison: Comparison, pair: tuple[str, str] = QUESTION, alpha: float = ALPHA) -> tuple[str, ...]:
-    """Sentences, most important first; empty where the pair was not compared."""
-    overall = comparison.pair(*pair)
-    if overall is None:
+def answer(comparison: Comparison, alpha: float = ALPHA) -> tuple[str, ...]:
+    """Sentences, most important first; empty where no pair was compared."""
+    if comparison.question is None:
         return ()
+    pair = comparison.question
+    overall = comparison.pair(*pair)
     sentences = [headline(overall, alpha), success_sentence(comparison, overall, alpha)]
     sentences += [metric_sentence(overall, measure, alpha) for measure in (DISTANCE, TIME)]
     families = [comparison.pair(*pair, stratum) for stratum in comparison.strata("family")]

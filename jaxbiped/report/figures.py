@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from jaxbiped.files import write_whole
 from jaxbiped.report.answer import MEASURES, SUCCESS, Measure, part, verdict
 from jaxbiped.report.words import OPEN
-from jaxbiped.study import ALL, CODES, QUESTION, Comparison, Estimate, Stratum, proportion
+from jaxbiped.study import ALL, CODES, Comparison, Estimate, Stratum, proportion
 
 # Okabe and Ito's colours, which colour-blind people tell apart: one for each strategy, in every figure.
 COLOURS = {
@@ -48,14 +48,13 @@ def write_figures(folder: str | Path, frame: pl.DataFrame, comparison: Compariso
       frame: the rows that `comparison` was made from.
     """
     frame = frame.filter(pl.col("point") == comparison.point)
-    compared = comparison.pair(*QUESTION) is not None
     figures: dict[str, tuple[Figure, str]] = {
         "success.png": (success(comparison), "Success of each strategy by family, with Wilson intervals."),
         "codes.png": (codes(comparison), "How the missions of each strategy ended."),
         "difficulty.png": (difficulty(frame, comparison), "Success against difficulty, with Wilson intervals."),
     }
-    if compared:
-        first, second = QUESTION
+    if comparison.question:
+        first, second = comparison.question
         caption = f"{first} minus {second} on the same arenas: success, and mean distance and time where both solved. "
         caption += "Filled: a difference is shown after Holm's correction. Cross: too few or too equal for an interval."
         figures["differences.png"] = (differences(comparison, first, second), caption)
@@ -78,7 +77,7 @@ def success(comparison: Comparison) -> Figure:
     for offset, strategy in zip(dodge(len(comparison.strategies), 0.64), comparison.strategies, strict=True):
         found = [(x, comparison.summary(strategy, stratum)) for x, stratum in enumerate(strata)]
         points = [(x + offset, item.success) for x, item in found if item and item.success.valid]
-        error_bars(ax, points, strategy, 100.0)
+        error_bars(ax, points, strategy, look(strategy, comparison.strategies), 100.0)
     for x in range(0, len(strata), 2):
         ax.axvspan(x - 0.5, x + 0.5, color="#F6F6F6", zorder=0, lw=0)
     sizes = [max(item.n for item in comparison.summaries if item.stratum == stratum) for stratum in strata]
@@ -157,11 +156,11 @@ def forest_row(ax: Axes, y: int, value: Estimate, measure: Measure, stratum: Str
     ax.plot(x, y, "D" if stratum == ALL else "o", color=colour, mfc=face, ms=7, mew=1.6)
 
 
-def times(frame: pl.DataFrame, first: str, second: str) -> Figure:
+def times(frame: pl.DataFrame, first: str, second: str, size: tuple[float, float] = (5.6, 5.4)) -> Figure:
     """A dot for each arena that both solved: below the diagonal the first is faster."""
     sides = [frame.filter((pl.col("strategy") == name) & pl.col("success")) for name in (first, second)]
     both = sides[0].join(sides[1].select("arena", "time"), on="arena", suffix="_second")
-    figure, ax = canvas(5.6, 5.4, grid="both")
+    figure, ax = canvas(*size, grid="both")
     families = list(dict.fromkeys(frame["family"]))
     for colour, family in zip(FAMILY_COLOURS, families, strict=False):
         rows = both.filter(pl.col("family") == family)
@@ -186,11 +185,11 @@ def times(frame: pl.DataFrame, first: str, second: str) -> Figure:
     return figure
 
 
-def difficulty(frame: pl.DataFrame, comparison: Comparison) -> Figure:
+def difficulty(frame: pl.DataFrame, comparison: Comparison, size: tuple[float, float] = (6.4, 4.2)) -> Figure:
     """Success in fifths of the arenas by difficulty, at the fifth's mean difficulty."""
     arenas = frame.unique("arena")["difficulty"].to_numpy()
     edges = np.unique(np.quantile(arenas, np.linspace(0, 1, BINS + 1)[1:-1], method="lower"))
-    figure, ax = canvas(6.4, 4.2)
+    figure, ax = canvas(*size)
     width = 0.25 * float(np.ptp(arenas)) / BINS
     for offset, strategy in zip(dodge(len(comparison.strategies), width), comparison.strategies, strict=True):
         rows = frame.filter(pl.col("strategy") == strategy)
@@ -201,7 +200,7 @@ def difficulty(frame: pl.DataFrame, comparison: Comparison) -> Figure:
             inside = bins == index
             rate = proportion(int(reached[inside].sum()), int(inside.sum()), comparison.level)
             points.append((float(values[inside].mean()) + offset, rate))
-        error_bars(ax, points, strategy, 100.0, line=True)
+        error_bars(ax, points, strategy, look(strategy, comparison.strategies), 100.0, line=True)
     ax.set_ylim(-2, 102)
     ax.set_xlabel("difficulty of the arena (0 easy, 1 hard)")
     ax.set_ylabel("reached the goal [%]")
@@ -209,16 +208,26 @@ def difficulty(frame: pl.DataFrame, comparison: Comparison) -> Figure:
     return figure
 
 
-def error_bars(ax: Axes, points: list[tuple[float, Estimate]], strategy: str, scale: float, line: bool = False) -> None:
-    """Dots with intervals in a strategy's colour and mark."""
+def look(name: str, names: Sequence[str]) -> tuple[str, str]:
+    """Colour and mark of one of `names`: a strategy's own, else by its place among them."""
+    if name in COLOURS:
+        return COLOURS[name], MARKERS[name]
+    place = names.index(name) % len(FAMILY_COLOURS)
+    return FAMILY_COLOURS[place], "osD^vP*"[place]
+
+
+def error_bars(
+    ax: Axes, points: list[tuple[float, Estimate]], name: str, look: tuple[str, str], scale: float, line: bool = False
+) -> None:
+    """Dots with intervals in a colour and mark."""
     if not points:
         return
     x = [at for at, _ in points]
     y = np.array([value.estimate for _, value in points]) * scale
     low, high = (np.array([getattr(value, end) for _, value in points]) * scale for end in ("low", "high"))
     bars = np.maximum(0, [y - low, high - y])
-    look = {"color": COLOURS[strategy], "fmt": MARKERS[strategy] + ("-" if line else ""), "label": strategy}
-    ax.errorbar(x, y, yerr=bars, ms=5.5, lw=1.4, elinewidth=1.4, capsize=2.5, **look)
+    style = {"color": look[0], "fmt": look[1] + ("-" if line else ""), "label": name}
+    ax.errorbar(x, y, yerr=bars, ms=5.5, lw=1.4, elinewidth=1.4, capsize=2.5, **style)
 
 
 def dodge(count: int, width: float) -> np.ndarray:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
+
+import polars as pl
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
 from jaxbiped.report.answer import answer
 from jaxbiped.report.figures import write_figures
+from jaxbiped.report.page import PAGE, page_of, render
 from jaxbiped.report.tables import markdown_sheets, to_markdown
 from jaxbiped.report.words import number
-from jaxbiped.study import ALL, QUESTION, Comparison, Manifest, compare, read, sample_size
+from jaxbiped.study import QUESTION, Comparison, Manifest, compare, read, sample_size
 
 SUMMARY = "summary.md"
 QUESTION_TEXT = "When, and by how much, does bump-aware planning beat floor-only planning?"
@@ -37,11 +41,11 @@ class Report:
     comparison: Comparison
     manifest: Manifest
     answer: tuple[str, ...]  # sentences, most important first
-    files: tuple[Path, ...]  # written: summary and figures
+    files: tuple[Path, ...]  # written: page, summary and figures
 
 
 def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -> Report:
-    """Read a results folder, compare its strategies, and write its figures and `summary.md` into it.
+    """Read a results folder, compare its strategies, and write `report.html`, `summary.md` and figures into it.
 
     May be called again at any time: the same rows give the same report. Seeds the bootstraps with the study's seed.
 
@@ -58,9 +62,18 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -
         raise InputError("has no rows to report on yet", file=folder)
     comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
     figures = write_figures(folder, frame, comparison)
-    text = summary(comparison, manifest, figures)
-    write_whole(folder / SUMMARY, lambda file: file.write(text.encode()))
-    files = tuple(folder / name for name in (SUMMARY, *figures))
+    page = page_of(
+        frame.filter(pl.col("point") == point),
+        comparison,
+        manifest,
+        title=question(comparison) if comparison.question else "One strategy on random arenas",
+        limitations=LIMITATIONS,
+        commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
+    )
+    texts = {PAGE: render(page), SUMMARY: summary(comparison, manifest, figures)}
+    for name, text in texts.items():
+        write_whole(folder / name, lambda file, text=text: file.write(text.encode()))
+    files = tuple(folder / name for name in (*texts, *figures))
     return Report(folder, comparison, manifest, answer(comparison), files)
 
 
@@ -76,7 +89,14 @@ def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str])
         lines += [f"**This study is not finished: it has {done} of {manifest.arenas} arenas.**", ""]
     sentences = answer(comparison)
     if sentences:
-        lines += [f"**{QUESTION_TEXT}**", "", f"**{sentences[0]}**", "", *(f"- {text}" for text in sentences[1:]), ""]
+        lines += [
+            f"**{question(comparison)}**",
+            "",
+            f"**{sentences[0]}**",
+            "",
+            *(f"- {text}" for text in sentences[1:]),
+            "",
+        ]
         lines += [pilot(comparison), ""]
     for name, caption in figures.items():
         lines += [f"![{caption}]({name})", "", f"*{caption}*", ""]
@@ -87,9 +107,17 @@ def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str])
     return "\n".join(lines + provenance(comparison, manifest))
 
 
+def question(comparison: Comparison) -> str:
+    """What the report answers."""
+    if comparison.question == QUESTION:
+        return QUESTION_TEXT
+    first, second = comparison.question
+    return f"How does {first} compare with {second}?"
+
+
 def pilot(comparison: Comparison) -> str:
     """How many arenas would show the observed difference in success, for who plans the next study."""
-    pair = comparison.pair(*QUESTION, ALL)
+    pair = comparison.pair(*comparison.question)
     first, second = pair.first_only / pair.success.n, pair.second_only / pair.success.n
     text = f"Only {pair.first} reached the goal on {pair.first_only} arenas, only {pair.second} on {pair.second_only}."
     if first == second:

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from jaxbiped.report.answer import ALPHA, DISTANCE, MEASURES, SUCCESS, TIME, Measure, answer, part
 from jaxbiped.report.words import NONE, brackets, number, p_cell, percent, signed
-from jaxbiped.study import ALL, CODES, QUESTION, Comparison, PairComparison, PairedMetric
+from jaxbiped.study import ALL, CODES, Comparison, PairComparison, PairedMetric
 
 Row = tuple[str, ...]
 
@@ -66,8 +66,8 @@ def comparison_table(comparison: Comparison) -> Table:
 def terminal(comparison: Comparison) -> Group:
     """What a comparison prints, 80 columns wide: strategies, failures, pairs, the question by family, the answer."""
     sheets = [strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison, detailed=1)]
-    if comparison.pair(*QUESTION) is not None and len(comparison.strata("family")) > 1:
-        sheets.append(short_stratum_sheet(comparison, *QUESTION, "family"))
+    if comparison.question and len(comparison.strata("family")) > 1:
+        sheets.append(short_stratum_sheet(comparison, *comparison.question, "family"))
     blocks: list[RenderableType] = []
     for sheet in sheets:
         if sheet.groups:

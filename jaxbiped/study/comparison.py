@@ -69,6 +69,12 @@ class Comparison:
     summaries: tuple[StrategySummary, ...]
     pairs: tuple[PairComparison, ...]
 
+    @property
+    def question(self) -> tuple[str, str] | None:
+        """The pair that a report is about: the project's question, else the first pair; None without pairs."""
+        pairs = [(pair.first, pair.second) for pair in self.pairs]
+        return QUESTION if QUESTION in pairs else next(iter(pairs), None)
+
     def strata(self, kind: str) -> tuple[Stratum, ...]:
         """The strata of one kind, in order."""
         return tuple(dict.fromkeys(item.stratum for item in self.summaries if item.stratum.kind == kind))

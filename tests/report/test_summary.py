@@ -34,7 +34,7 @@ def test_the_summary_says_where_it_comes_from(tmp_path):
     assert report.manifest.config_hash in text and '"seed": 3' in text
     assert "## Limitations" in text and "not finished" not in text
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
-    assert [folder / name for name in ["summary.md", *pictures]] == list(report.files)
+    assert [folder / name for name in ["report.html", "summary.md", *pictures]] == list(report.files)
     assert all(path.exists() for path in report.files)
 
 

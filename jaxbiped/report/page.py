@@ -1,0 +1,173 @@
+"""The report as one HTML page that needs nothing else: no network, no script, all figures inside."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+
+import jinja2
+import polars as pl
+
+from jaxbiped.report.answer import MEASURES, answer, part, verdict
+from jaxbiped.report.grid import Grid, to_grid, typeset
+from jaxbiped.report.plots import Plot, plots
+from jaxbiped.report.tables import (
+    code_sheet,
+    pair_sheet,
+    strategy_sheet,
+    stratum_sheet,
+    success_sheet,
+)
+from jaxbiped.report.words import OPEN, number, signed
+from jaxbiped.study import Comparison, Manifest
+
+PAGE = "report.html"
+
+
+@dataclass(frozen=True)
+class Key:
+    """One of the figures under the answer."""
+
+    name: str
+    value: str
+    limits: str
+    shown: bool  # a difference is
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the page: text, then figures, then tables."""
+
+    title: str
+    text: tuple[str, ...] = ()
+    plots: tuple[Plot, ...] = ()
+    grids: tuple[Grid, ...] = ()
+    kind: str = ""  # "wide": figures below each other
+
+
+@dataclass(frozen=True)
+class Page:
+    """Everything that the page says, in its order."""
+
+    title: str
+    kicker: str
+    answer: tuple[str, ...]
+    keys: tuple[Key, ...]
+    sections: tuple[Section, ...]
+    limitations: tuple[str, ...]
+    commands: tuple[str, ...]
+    facts: dict[str, str]
+    config: str
+    warnings: tuple[str, ...] = field(default=())
+
+
+def render(page: Page) -> str:
+    """The page as HTML; the same page gives the same text. Whatever a page says is escaped, but for its figures."""
+    return template().render(page=page, css=resources.files("jaxbiped.report").joinpath("page.css").read_text())
+
+
+@cache
+def template() -> jinja2.Template:
+    """`page.html` beside this file."""
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    return environment.from_string(resources.files("jaxbiped.report").joinpath("page.html").read_text())
+
+
+def keys(comparison: Comparison) -> tuple[Key, ...]:
+    """The differences of the pair that the page is about, over all arenas."""
+    if comparison.question is None:
+        return ()
+    first, second = comparison.question
+    pair = comparison.pair(first, second)
+    found = []
+    for measure in MEASURES:
+        value, _ = part(pair, measure)
+        if not value.valid:
+            continue
+        limits = "too few arenas, or too equal, for an interval"
+        if value.low is not None:
+            low, high = (typeset(signed(limit * measure.scale, measure.digits)) for limit in (value.low, value.high))
+            limits = f"{low} to {high}, on {value.n:,} arenas"
+        name = f"{measure.name}, {first} less {second}"
+        amount = typeset(signed(value.estimate * measure.scale, measure.digits))
+        found.append(Key(name, f"{amount} {measure.unit}", limits, verdict(pair, measure) != OPEN))
+    return tuple(found)
+
+
+def sections(frame: pl.DataFrame, comparison: Comparison) -> tuple[Section, ...]:
+    """Strategies, the pair, its strata, and what became of the missions.
+
+    Args:
+      frame: the rows that `comparison` was made from.
+    """
+    drawn = plots(frame, comparison)
+    kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
+    found = [
+        Section("Strategies", plots=tuple(drawn["strategies"]), grids=(to_grid(strategy_sheet(comparison)),)),
+    ]
+    if comparison.question:
+        first, second = comparison.question
+        pairs = to_grid(pair_sheet(comparison))
+        found.append(Section("On the same arenas", plots=tuple(drawn["strata"] + drawn["pair"]), grids=(pairs,)))
+        strata = tuple(to_grid(stratum_sheet(comparison, first, second, kind)) for kind in kinds)
+        rates = tuple(to_grid(success_sheet(comparison, kind)) for kind in kinds)
+        found.append(Section("Where it differs", grids=strata + rates))
+    codes = Section("How missions fail", plots=tuple(drawn["failures"]), grids=(to_grid(code_sheet(comparison)),))
+    return (*found, codes)
+
+
+def facts(comparison: Comparison, manifest: Manifest) -> dict[str, str]:
+    """Where the numbers come from."""
+    versions = ", ".join(f"{name} {version}" for name, version in manifest.versions.items())
+    speed = (
+        f" ({manifest.rows / manifest.wall_time:.0f} missions a second)" if manifest.wall_time and manifest.rows else ""
+    )
+    return {
+        "Seed": str(manifest.seed),
+        "Config hash": manifest.config_hash,
+        "Started": manifest.started,
+        "Wall time": f"{number(manifest.wall_time, 1)} s{speed}, of it compiling {number(manifest.compile_time, 1)} s",
+        "Device": manifest.device,
+        "Versions": versions,
+        "Bootstraps": f"{comparison.resamples} resamples, seed {comparison.seed}",
+    }
+
+
+def page_of(
+    frame: pl.DataFrame,
+    comparison: Comparison,
+    manifest: Manifest,
+    *,
+    title: str,
+    limitations: tuple[str, ...],
+    commands: tuple[str, ...],
+    more: tuple[Section, ...] = (),
+) -> Page:
+    """The page of one comparison.
+
+    Args:
+      frame: the rows that it was made from.
+      commands: that made it.
+      more: sections between the tables and the limitations.
+    """
+    arenas = comparison.summary(comparison.strategies[0]).n
+    warnings = ()
+    if manifest.state != "finished":
+        warnings = (f"This study is not finished: it has {arenas:,} of {manifest.arenas:,} arenas.",)
+    kicker = f"jaxbiped · {arenas:,} random arenas · seed {manifest.seed} · intervals at {100 * comparison.level:g} %"
+    return Page(
+        title=title,
+        kicker=kicker,
+        answer=tuple(typeset(sentence) for sentence in answer(comparison)),
+        keys=keys(comparison),
+        sections=(*sections(frame, comparison), *more),
+        limitations=limitations,
+        commands=commands,
+        facts=facts(comparison, manifest),
+        config=json.dumps(manifest.config, indent=2, sort_keys=True),
+        warnings=warnings,
+    )

@@ -1,0 +1,143 @@
+"""Figures of the HTML page: each one as narrow as a telephone, so that they lie side by side on anything wider."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+from matplotlib.figure import Figure
+
+from jaxbiped.report.answer import MEASURES, SUCCESS, Measure, part, verdict
+from jaxbiped.report.figures import CODE_COLOURS, canvas, difficulty, forest_row, legend_above, look, style, times
+from jaxbiped.report.svg import INK, LINE, inline, themed
+from jaxbiped.report.words import OPEN
+from jaxbiped.study import ALL, CODES, Comparison
+
+WIDTH = 5.2  # [inch]
+NO_PLAN = "#BFC6CE"
+ON_COLOUR = "#FEFEFE"  # letters on a bar: white in the dark, too
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A figure as it lies in the page."""
+
+    svg: str
+    caption: str
+
+
+def plots(frame: pl.DataFrame, comparison: Comparison) -> dict[str, list[Plot]]:
+    """The figures that the rows have data for, by the section of the page that they belong to.
+
+    Args:
+      frame: the rows that `comparison` was made from.
+    """
+    result = {"strategies": [], "pair": [], "strata": [], "failures": []}
+
+    def add(section: str, name: str, figure: Figure, caption: str) -> None:
+        result[section].append(Plot(inline(figure, name, caption), caption))
+
+    with themed():
+        add("strategies", "rates", rates(comparison), "Reached the goal, with Wilson intervals.")
+        caption = "Success against difficulty, in fifths of the arenas, with Wilson intervals."
+        add("strategies", "difficulty", difficulty(frame, comparison, (WIDTH, 3.6)), caption)
+        if comparison.question:
+            first, second = comparison.question
+            for measure in MEASURES:
+                caption = (
+                    f"Difference in {measure.name}, {first} less {second}, with its interval. Filled: shown after "
+                )
+                caption += "Holm’s correction. Cross: too few arenas, or too equal, for an interval."
+                add("strata", f"forest-{measure.name}", forest(comparison, first, second, measure), caption)
+            caption = "Time on each arena that both solved."
+            add("pair", "times", times(frame, first, second, (WIDTH, WIDTH)), caption)
+        caption = "Where missions went: those without a plan would fail with perfect knowledge of the arena, too. "
+        caption += "All others but the reached were lost by sensing, planning on what was sensed, or walking."
+        add("failures", "attribution", attribution(frame, comparison), caption)
+    return result
+
+
+def rates(comparison: Comparison) -> Figure:
+    """A row for each strategy: its success with its interval."""
+    names = comparison.strategies
+    figure, ax = canvas(WIDTH, 1.0 + 0.38 * len(names), grid="x")
+    for y, name in enumerate(names):
+        rate = comparison.summary(name).success
+        colour, mark = look(name, names)
+        if rate.valid:
+            ax.plot([100 * rate.low, 100 * rate.high], [y, y], color=colour, lw=2, solid_capstyle="butt")
+            ax.plot(100 * rate.estimate, y, mark, color=colour, ms=7)
+    ax.set_yticks(range(len(names)), names)
+    ax.set_ylim(len(names) - 0.5, -0.5)
+    ax.set_xlim(-2, 102)
+    ax.set_xlabel("reached the goal [%]")
+    ax.tick_params(axis="y", length=0)
+    return figure
+
+
+def forest(comparison: Comparison, first: str, second: str, measure: Measure) -> Figure:
+    """One measure: over all arenas, then each family, then each third of difficulty."""
+    groups = [(ALL,), *(comparison.strata(kind) for kind in ("family", "difficulty"))]
+    groups = [group for group in groups if group]
+    count = sum(len(group) for group in groups)
+    figure, ax = canvas(WIDTH, 1.2 + 0.3 * count, grid="x")
+    ax.axvline(0, color=INK, lw=1)
+    y, names = 0, []
+    for group in groups:
+        for stratum in group:
+            pair = comparison.pair(first, second, stratum)
+            shown = verdict(pair, measure) != OPEN
+            forest_row(ax, y, part(pair, measure)[0], measure, stratum, shown)
+            names.append(stratum.name if stratum.kind != "difficulty" else f"difficulty {stratum.name}")
+            y += 1
+        if y < count:
+            ax.axhline(y - 0.5, color=LINE, lw=1)
+    spread = max(abs(limit) for limit in ax.get_xlim())
+    ax.set_xlim(-spread, spread)
+    ax.set_yticks(range(count), names)
+    ax.set_ylim(count - 0.4, -0.6)
+    left, right = (second, first) if measure is SUCCESS else (first, second)
+    ax.set_xlabel(f"← {left} better\u2003\u2003{right} better →")
+    ax.set_title(f"{measure.name} [{measure.unit}]")
+    ax.tick_params(axis="y", length=0)
+    return figure
+
+
+def attribution(frame: pl.DataFrame, comparison: Comparison) -> Figure:
+    """Stacked bars, a strategy each: reached, without a plan, and how the others were lost."""
+    names = comparison.strategies
+    figure = Figure(figsize=(WIDTH, 1.5 + 0.4 * len(names)), layout="constrained")
+    ax = figure.subplots()
+    style(ax, "x")
+    shares = attributed(frame, names)
+    left = np.zeros(len(names))
+    for label, values in shares.items():
+        if not values.any():
+            continue
+        colour = NO_PLAN if label == "no plan exists" else CODE_COLOURS[label]
+        ax.barh(range(len(names)), values, left=left, color=colour, label=label.replace("_", " "), height=0.66)
+        for y, (value, start) in enumerate(zip(values, left, strict=True)):
+            if value >= 5:
+                ink = "#222222" if label in ("reached", "no plan exists", "no_path", "out_of_steps") else ON_COLOUR
+                ax.text(start + value / 2, y, f"{value:.0f}", ha="center", va="center", color=ink, fontsize=8)
+        left += values
+    ax.set_yticks(range(len(names)), names)
+    ax.invert_yaxis()
+    ax.set_xlim(0, 100)
+    ax.set_xlabel("missions [%]")
+    ax.tick_params(axis="y", length=0)
+    legend_above(figure, ax, columns=4)
+    return figure
+
+
+def attributed(frame: pl.DataFrame, names: tuple[str, ...]) -> dict[str, np.ndarray]:
+    """Shares [%] of missions by what became of them, a value for each strategy."""
+    lost = pl.col("strategy").is_not_null() & ~pl.col("success")
+    wheres = {"reached": pl.col("success"), "no plan exists": lost & ~pl.col("reachable")}
+    wheres |= {code: lost & pl.col("reachable") & (pl.col("code") == code) for code in CODES[1:]}
+    sides = [frame.filter(pl.col("strategy") == name) for name in names]
+    return {
+        label: np.array([100 * side.select(where.sum()).item() / max(len(side), 1) for side in sides])
+        for label, where in wheres.items()
+    }
