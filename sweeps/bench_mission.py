@@ -43,7 +43,9 @@ from jaxbiped.mission.queue import SLOTS, stack
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.mission.strategies import STRATEGIES
-from jaxbiped.study.evaluate import WORKERS, CompileClock, StudyConfig, draw, evaluate, run_all
+from jaxbiped.study.clock import CompileClock
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.evaluate import WORKERS, draw, evaluate, run_all
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.reference import mission as reference

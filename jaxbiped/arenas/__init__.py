@@ -2,6 +2,7 @@
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
 from jaxbiped.arenas.families import FAMILIES, sample
+from jaxbiped.arenas.population import Population, PopulationConfig
 from jaxbiped.arenas.scene import SceneConfig, load_scene, to_arena
 
 __all__ = [
@@ -10,6 +11,8 @@ __all__ = [
     "SQUARE",
     "Arena",
     "Landmarks",
+    "Population",
+    "PopulationConfig",
     "SceneConfig",
     "load_scene",
     "sample",

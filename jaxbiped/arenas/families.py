@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
+from jaxbiped.arenas.population import Population, given_or
 from jaxbiped.geometry.boxes import Boxes, footprint_extent, plan_distance
 
 FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")
@@ -32,7 +33,12 @@ LANDMARKS_Y = (0.12, 1.28, 0.12, 1.28, 0.35, 1.05)
 LANDMARKS_KIND = (SQUARE, SQUARE, CIRCLE, CIRCLE, CIRCLE, CIRCLE)
 
 
-def sample(key: PRNGKeyArray, index: Int[Array, ""] | int, families: tuple[str, ...] = FAMILIES) -> Arena:
+def sample(
+    key: PRNGKeyArray,
+    index: Int[Array, ""] | int,
+    families: tuple[str, ...] = FAMILIES,
+    population: Population | None = None,
+) -> Arena:
     """Arena `index` of the population that `key` names.
 
     Consumes `fold_in(key, index)`, never `key` itself. Families take turns (`index` modulo their number), so that
@@ -40,6 +46,7 @@ def sample(key: PRNGKeyArray, index: Int[Array, ""] | int, families: tuple[str, 
 
     Args:
       families: static; which families take turns.
+      population: what is fixed and not drawn; all else of the arena stays as it is.
     """
     turn = jnp.asarray(index) % len(families)
     # One draw feeds every part: each call of the generator costs compile time.
@@ -49,7 +56,8 @@ def sample(key: PRNGKeyArray, index: Int[Array, ""] | int, families: tuple[str, 
     start = jnp.array([0.25, 0.70, 0.0]) + (2 * u[0, 1:4] - 1) * jnp.array([0.05, 0.20, 0.26])
     goal = jnp.array([1.45, 0.70]) + (2 * u[0, 4:6] - 1) * jnp.array([0.05, 0.20])
     middle = (start[:2] + goal) / 2
-    layouts = [LAYOUTS[name](u[4:], difficulty, middle) for name in families]
+    fixed = {"bump": {"population": population}}  # the one family that has something to fix
+    layouts = [LAYOUTS[name](u[4:], difficulty, middle, **fixed.get(name, {})) for name in families]
     boxes = replace(jax.tree.map(lambda *leaves: jnp.stack(leaves)[turn], *layouts), contrast=0.5 + 0.5 * u[1])
     boxes = _keep_ends_free(_keep_inside(boxes), start[:2], goal)
     return Arena(
@@ -89,11 +97,13 @@ def _obstacles(u, difficulty, middle, slots: int = 6) -> Boxes:
     return _boxes(x, y, (u[5] - 0.5) * jnp.pi, half_x, half_y, 0.0, top, used)
 
 
-def _bump(u, difficulty, middle) -> Boxes:
+def _bump(u, difficulty, middle, population: Population | None = None) -> Boxes:
     """A bar of 3 cm across the straight way, 15 to 45 cm wide, turned up to 30 degrees; harder: a longer detour."""
     u = 2 * u[6] - 1
     half_y = 0.18 + difficulty * 0.52 + 0.06 * u[0]
     half_x = 0.15 + 0.075 * u[1]
+    if population is not None:
+        half_x, half_y = given_or(population.bump_width / 2, half_x), given_or(population.bump_length / 2, half_y)
     return _boxes(middle[0] + 0.10 * u[2], middle[1] + 0.10 * u[3], 0.5 * u[4], half_x, half_y, 0.0, BUMP)
 
 

@@ -5,7 +5,7 @@ from jaxbiped.mission.executors import EXECUTORS, Execution, Executor, kinematic
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, Result, compile_queue, stack
+from jaxbiped.mission.queue import Jobs, Result, Tally, compile_queue, stack
 from jaxbiped.mission.settings import MissionConfig, Program, Settings, program
 from jaxbiped.mission.state import Mind, World, start
 from jaxbiped.mission.stepped import Mission, run_logged
@@ -27,6 +27,7 @@ __all__ = [
     "Result",
     "Settings",
     "Strategy",
+    "Tally",
     "World",
     "compile_queue",
     "decide",

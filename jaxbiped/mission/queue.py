@@ -63,7 +63,24 @@ class Queue:
     result: Result
 
 
-Work = Callable[[Arena, Settings, Jobs, Callable[[int], None]], Result]
+@dataclass(frozen=True)
+class Tally:
+    """How far a queue is."""
+
+    ended: int  # missions
+    reached: int  # of these, as they should
+
+    def __add__(self, other: Tally) -> Tally:
+        return Tally(self.ended + other.ended, self.reached + other.reached)
+
+
+def tally(code: Int[np.ndarray, "N"]) -> Tally:
+    """Of a queue's codes so far."""
+    return Tally(int(np.sum(code != Code.RUNNING)), int(np.sum(code == Code.REACHED)))
+
+
+OnProgress = Callable[[Tally], None]
+Work = Callable[[Arena, Settings, Jobs, OnProgress], Result]
 
 
 def compile_queue(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int = SLOTS) -> Work:
@@ -77,7 +94,7 @@ def compile_queue(arenas: Arena, settings: Settings, jobs: Jobs, program: Progra
     Returns:
       A function of (arenas, settings, jobs, on_progress) that works the queue off and gives results in the order of
       the jobs; padding stays RUNNING. It may be called by several threads at once. `on_progress` is called on the
-      host with the number of jobs that have ended, every `TURNS` decisions.
+      host with the tally of the jobs, every `TURNS` decisions.
     """
     signature = (program, slots, jax.tree.structure((arenas, settings, jobs)), *shapes((arenas, settings, jobs)))
     if signature not in COMPILED:
@@ -87,12 +104,12 @@ def compile_queue(arenas: Arena, settings: Settings, jobs: Jobs, program: Progra
         COMPILED[signature] = filled.compile(), wide(turned)
     first, further = COMPILED[signature]
 
-    def work(arenas: Arena, settings: Settings, jobs: Jobs, on_progress: Callable[[int], None]) -> Result:
+    def work(arenas: Arena, settings: Settings, jobs: Jobs, on_progress: OnProgress) -> Result:
         queue = first(arenas, settings, jobs)
         while True:
             queue = further(queue, arenas, settings, jobs)
             code, job = jax.device_get((queue.result.code, queue.job))
-            on_progress(int(np.sum(code != Code.RUNNING)))
+            on_progress(tally(code))
             if np.all(job >= jobs.count):
                 return queue.result
 

@@ -26,7 +26,7 @@ from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.footwork import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
 from jaxbiped.mission.judging import Plan, choose_rows, fresh, gather, judge_and_think, no_plan, scatter
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, Result
+from jaxbiped.mission.queue import Jobs, OnProgress, Result, tally
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.stage import Stage
 from jaxbiped.mission.state import Carriage, Mind, World, start
@@ -57,14 +57,14 @@ def walk(
     jobs: Jobs,
     program: Program,
     config: WalkConfig,
-    on_progress: Callable[[int], None] = lambda ended: None,
+    on_progress: OnProgress = lambda tally: None,
     observer: Observer | None = None,
 ) -> Result:
     """Work a queue of missions off; `program.executor` names the physics.
 
     Args:
       arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
-      on_progress: called with the number of jobs that have ended.
+      on_progress: called with the tally of the jobs.
 
     Returns:
       Results in the order of the jobs, on the host; padding stays RUNNING.
@@ -141,7 +141,7 @@ class Walkers:
         self.plan = no_plan(size)
         self.enter(np.ones(size, bool))
 
-    def work(self, on_progress: Callable[[int], None]) -> Result:
+    def work(self, on_progress: OnProgress) -> Result:
         """Until the queue is empty."""
         while np.any(self.job < self.count):
             stopped = self.stage.fell | self.stage.collided | ~self.stage.state.valid
@@ -149,7 +149,7 @@ class Walkers:
             for first in range(0, len(ready), ROWS):
                 self.turn(ready[first : first + ROWS])
             if len(ready):
-                on_progress(int(np.sum(self.result.code != Code.RUNNING)))
+                on_progress(tally(self.result.code))
             else:
                 self.play()
         return self.result

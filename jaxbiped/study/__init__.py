@@ -24,7 +24,7 @@ from jaxbiped.study.paired import (
 )
 from jaxbiped.study.power import connor_sample_size, mcnemar_power, sample_size
 from jaxbiped.study.schema import CODES, FAMILIES, SCHEMA, STRATEGIES, validate
-from jaxbiped.study.store import Manifest, Store, create, read, read_manifest, scan
+from jaxbiped.study.store import Manifest, Store, create, read, read_manifest, read_points, scan
 
 __all__ = [
     "ALL",
@@ -57,6 +57,7 @@ __all__ = [
     "proportion",
     "read",
     "read_manifest",
+    "read_points",
     "sample_size",
     "scan",
     "signed_rank",

@@ -3,103 +3,109 @@
 from __future__ import annotations
 
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Annotated, Literal
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import polars as pl
-import pydantic
-import tyro
 from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 
 from jaxbiped import arenas as arena_room
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.families import SIZE_X, SIZE_Y
-from jaxbiped.config import Model
+from jaxbiped.arenas.population import Population
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import SLOTS, Jobs, Result, compile_queue, stack
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program
+from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, compile_queue
+from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.schema import FAMILIES, SCENE, SCHEMA, STRATEGIES
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards
+from jaxbiped.study.schema import FAMILIES, SCENE, SCHEMA
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 WORKERS = 2  # queues worked off at once, a core each
-
-Family = Literal[FAMILIES]
-StrategyName = Literal[STRATEGIES]
-
-
-class StudyConfig(Model):
-    """Strategies compared on the same random arenas."""
-
-    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Arena k and its noise are functions of this seed and of k alone."""
-    arenas: Annotated[int, pydantic.Field(ge=1, le=100_000_000)] = 600
-    families: Annotated[tuple[Family, ...], pydantic.Field(min_length=1)] = FAMILIES
-    """They take turns: arena k is of family k modulo their number."""
-    strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
-    shard: Annotated[int, pydantic.Field(ge=1, le=65536)] = 1024
-    """Arenas that are computed, and written, together."""
-    mission: Annotated[MissionConfig, tyro.conf.arg(name="")] = MissionConfig()
-
-    @pydantic.model_validator(mode="after")
-    def _distinct(self):
-        for name in ("families", "strategies"):
-            if len(set(getattr(self, name))) < len(getattr(self, name)):
-                raise ValueError(f"{name} must be named once each")
-        return self
+LABELS = np.array([code.label for code in Code if code != Code.RUNNING])  # by code
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a study is."""
+    """How far a study is: missions of this run, and all that it has to do."""
 
-    ended: int  # missions
+    ended: int
+    reached: int
     total: int
 
 
-def evaluate(config: StudyConfig, on_progress: Callable[[Progress], None] | None = None) -> Iterator[pl.DataFrame]:
-    """Rows of `schema.SCHEMA`, a frame for each shard of arenas; memory does not grow with the number of arenas.
+def evaluate(
+    config: StudyConfig,
+    on_progress: Callable[[Progress], None] | None = None,
+    *,
+    points: Sequence[Point] | None = None,
+    done: Collection[int] = (),
+) -> Iterator[tuple[Shard, pl.DataFrame]]:
+    """Rows of `schema.SCHEMA`, a frame for each shard; memory does not grow with the number of arenas.
 
     Consumes `jax.random.key(config.seed)`.
+
+    Args:
+      points: sweep points; by default the one of `config`.
+      done: numbers of shards to leave out. What others hold does not depend on them.
     """
-    key = jax.random.key(config.seed)
-    points = stack([config.mission.settings(name) for name in config.strategies])
-    static = program(config.mission, (SIZE_X, SIZE_Y))
-    size = min(config.shard, config.arenas)
-    total = config.arenas * len(config.strategies)
-    for first in range(0, config.arenas, size):
-        count = min(size, config.arenas - first)
-        # The last shard is filled up with arenas beyond the study, so that all shards share one program.
-        batch, seeds = draw(key, first + jnp.arange(size), config.families)
-        before = first * len(config.strategies)
+    groups = group_points(points or only_point(config), config.strategies)
+    left = [shard for shard in shards(config, len(groups)) if shard.number not in done]
+    rows = [shard.count * len(groups[shard.group].population_of) for shard in left]
+    before, total = Tally(0, 0), sum(rows)
+    for shard in left:
+        last = [before]
 
-        def report(ended: int, before: int = before) -> None:
+        def report(tally: Tally, before: Tally = before, last: list[Tally] = last) -> None:
+            last[0] = before + tally
             if on_progress:
-                on_progress(Progress(before + ended, total))
+                on_progress(Progress(last[0].ended, last[0].reached, total))
 
-        play = run_all
-        if static.executor in SIMULATED:
-            from jaxbiped.study.walks import walk_all  # loads MuJoCo
+        yield shard, compute(config, groups[shard.group], shard, report)
+        before = last[0]
 
-            play = partial(walk_all, config=config.mission.walk)
-        result = play(batch, seeds, points, count, static, report)
-        plan = oracle_plan(batch, points, static)
-        index = np.arange(first, first + count)
-        yield frame(index, batch, config.strategies, result, plan, count)
+
+def compute(config: StudyConfig, group: Group, shard: Shard, on_progress: OnProgress = lambda tally: None):
+    """The rows of one shard: a function of its arguments alone, whatever was computed before, and where."""
+    # The last shard is filled up with arenas beyond the study, so that all shards share one program.
+    size = min(config.shard, config.arenas)
+    index = shard.first + jnp.arange(size)
+    batch, seeds = draw(jax.random.key(config.seed), index, config.families, group.populations)
+    play = run_all
+    if group.walk is not None:
+        from jaxbiped.study.walks import walk_all  # loads MuJoCo
+
+        play = partial(walk_all, config=group.walk)
+    result = play(
+        batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
+    )
+    plan = plan_all(batch, group, size)
+    return frame(np.arange(shard.first, shard.first + shard.count), batch, group, config.strategies, result, plan)
 
 
 @partial(jax.jit, static_argnames=("families",))
-def draw(key: PRNGKeyArray, index: Int[Array, "A"], families: tuple[str, ...]) -> tuple[Arena, UInt32[Array, "A"]]:
-    """Arenas `index` of the population, and the seeds of their missions' noise: the same for all strategies."""
-    batch = jax.vmap(partial(arena_room.sample, key, families=families))(index)
+def draw(
+    key: PRNGKeyArray, index: Int[Array, "A"], families: tuple[str, ...], populations: Population | None = None
+) -> tuple[Arena, UInt32[Array, "A"]]:
+    """Arenas `index` of the population, and the seeds of their missions' noise: the same for all strategies.
+
+    Args:
+      populations: leaves [U]; the arenas are then those of each of them, one after the other: [U * A].
+    """
+
+    def one(population: Population | None) -> Arena:
+        return jax.vmap(lambda k: arena_room.sample(key, k, families, population))(index)
+
+    if populations is None:
+        batch = one(None)
+    else:
+        batch = jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), jax.vmap(one)(populations))
     seeds = jax.vmap(lambda k: from_key(jax.random.fold_in(jax.random.fold_in(key, k), NOISE)))(index)
     return batch, seeds
 
@@ -110,15 +116,21 @@ def run_all(
     points: Settings,
     count: int,
     static: Program,
-    on_progress: Callable[[int], None],
+    on_progress: OnProgress,
     workers: int = WORKERS,
     slots: int = SLOTS,
+    population_of: Int[np.ndarray, "P"] | None = None,
 ) -> Result:
-    """Every arena under every point: results [P, count], on the host.
+    """The first `count` arenas under every point: results [P, count], on the host.
 
     Jobs are dealt to as many queues as there are workers. Which queue a job is in does not change its result.
+
+    Args:
+      batch: [A], or [U * A] where there are `U` populations.
+      population_of: which of these each point is about; by default the first.
     """
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
+    block = size * (np.zeros(kinds, int) if population_of is None else population_of)
     arena, point = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(kinds)))
     real = arena < count
     arena, point = np.concatenate([arena[real], arena[~real]]), np.concatenate([point[real], point[~real]])
@@ -129,20 +141,20 @@ def run_all(
         mine = np.arange(worker, size * kinds, workers)
         mine = np.concatenate([mine, np.zeros(length - len(mine), int)])
         active = len(range(worker, count * kinds, workers))
-        jobs = Jobs(jnp.asarray(arena[mine]), jnp.asarray(point[mine]), seeds[arena[mine]], jnp.int32(active))
+        place = jnp.asarray(arena[mine] + block[point[mine]])
+        jobs = Jobs(place, jnp.asarray(point[mine]), seeds[arena[mine]], jnp.int32(active))
         hands.append(jobs)
     work = compile_queue(batch, points, hands[0], static, min(slots, length))
-    ended, lock = [0] * workers, threading.Lock()
-
+    tallies, lock = [Tally(0, 0)] * workers, threading.Lock()
     stop = threading.Event()
 
     def play(worker: int) -> Result:
-        def tell(done: int) -> None:
+        def tell(tally: Tally) -> None:
             if stop.is_set():
                 raise InterruptedError
             with lock:
-                ended[worker] = done
-                on_progress(sum(ended))
+                tallies[worker] = tally
+                on_progress(sum(tallies, Tally(0, 0)))
 
         return jax.device_get(work(batch, points, hands[worker], tell))
 
@@ -160,71 +172,60 @@ def run_all(
     return out
 
 
+def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
+    """The oracle plans of all points [P * S] on the arenas [A] of their populations, on the host."""
+    kinds = len(group.population_of)
+    out = OraclePlan(np.zeros((kinds, size), bool), *(np.zeros((kinds, size), np.float32) for _ in range(2)))
+    for population in np.unique(group.population_of):
+        mine = np.flatnonzero(group.population_of == population)
+        arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
+        settings = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.settings)
+        plan = jax.device_get(oracle_plan(arenas, settings, group.static))
+        for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(plan), strict=True):
+            rows[mine] = found
+    return out
+
+
 def frame(
     index: Int[np.ndarray, "A"],
     batch: Arena,
+    group: Group,
     strategies: Sequence[str],
     result: Result,
     plan: OraclePlan,
-    count: int,
 ) -> pl.DataFrame:
-    """Rows of all strategies on `count` arenas."""
-    plan, family, difficulty = jax.device_get((plan, batch.family, batch.difficulty))
-    names = np.array([*FAMILIES, SCENE])[family[:count]]
-    frames = []
-    for p, name in enumerate(strategies):
-        reached = result.code[p] == Code.REACHED
-        walked, elapsed = result.distance[p].astype(float), result.time[p].astype(float)
-        reachable = plan.reachable[p, :count]
-        columns = {
-            "point": np.zeros(count, np.int32),
-            "arena": index,
-            "family": names,
-            "difficulty": difficulty[:count],
-            "strategy": [name] * count,
-            "code": [Code(int(code)).label for code in result.code[p]],
-            "success": reached,
-            "distance": masked(walked, reached),
-            "time": masked(elapsed, reached),
-            "walked": walked,
-            "elapsed": elapsed,
-            "measurements": result.measurements[p],
-            "decisions": result.decisions[p],
-            "goal_distance": result.goal_distance[p].astype(float),
-            "reachable": reachable,
-            "oracle_cost": masked(plan.cost[p, :count].astype(float), reachable),
-            "oracle_length": masked(
-                plan.length[p, :count].astype(float), reachable & np.isfinite(plan.length[p, :count])
-            ),
-        }
-        frames.append(pl.DataFrame(columns, schema=SCHEMA))
-    return pl.concat(frames)
+    """Rows of all points and strategies on arenas `index`, the first of the batch."""
+    count, kinds = len(index), len(group.population_of)
+    family, difficulty = jax.device_get((batch.family[:count], batch.difficulty[:count]))
+    reached = result.code == Code.REACHED
+    reachable, cost, length = (values[:, :count] for values in (plan.reachable, plan.cost, plan.length))
+    columns = {
+        "point": np.repeat(group.points, len(strategies) * count),
+        "arena": np.tile(index, kinds),
+        "family": np.tile(np.array([*FAMILIES, SCENE])[family], kinds),
+        "difficulty": np.tile(difficulty, kinds),
+        "strategy": np.tile(np.repeat(strategies, count), len(group.points)),
+        "code": LABELS[result.code],
+        "success": reached,
+        "distance": masked(result.distance, reached),
+        "time": masked(result.time, reached),
+        "walked": result.distance,
+        "elapsed": result.time,
+        "measurements": result.measurements,
+        "decisions": result.decisions,
+        "goal_distance": result.goal_distance,
+        "reachable": reachable,
+        "oracle_cost": masked(cost, reachable),
+        "oracle_length": masked(length, reachable & np.isfinite(length)),
+    }
+    flat = {name: column.ravel() if isinstance(column, np.ndarray) else column for name, column in columns.items()}
+    return pl.DataFrame(flat, schema_overrides={"point": pl.Int32}).cast(dict(SCHEMA))
 
 
 def masked(values: np.ndarray, valid: np.ndarray) -> pl.Series:
     """A column that is null where it is not valid."""
-    return pl.DataFrame({"value": values, "valid": valid}).select(pl.when("valid").then("value")).to_series()
-
-
-class CompileClock:
-    """Seconds that this process has spent compiling, by JAX's own count."""
-
-    EVENTS = (
-        "/jax/core/compile/jaxpr_trace_duration",
-        "/jax/core/compile/jaxpr_to_mlir_module_duration",
-        "/jax/core/compile/backend_compile_duration",
+    return (
+        pl.DataFrame({"value": values.ravel(), "valid": valid.ravel()})
+        .select(pl.when("valid").then("value"))
+        .to_series()
     )
-
-    def __init__(self):
-        self.seconds = 0.0
-        jax.monitoring.register_event_duration_secs_listener(self.listen)
-
-    def listen(self, event: str, duration: float, **_: object) -> None:
-        if event in self.EVENTS:
-            self.seconds += duration
-
-
-def stopwatch() -> Callable[[], float]:
-    """Seconds since the call."""
-    start = time.perf_counter()
-    return lambda: time.perf_counter() - start

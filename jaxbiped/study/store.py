@@ -1,78 +1,34 @@
 """A results folder: rows as Parquet shards and a JSON manifest that says what they are.
 
-    <folder>/manifest.json          written first, so that what is there can always be named
+    <folder>/manifest.json          written before any row, so that what is there can always be named
+    <folder>/points.parquet         the sweep points: `point`, and a column for each field that is swept
     <folder>/rows/part-00000.parquet  the rows of one block of arenas, or of another unit that the writer numbers
 
 Every file is whole or not there; a shard that is there is done. A study that was stopped is therefore its manifest and
-some of its shards, and the numbers of those that are missing say what is left to do.
+some of its shards, and the numbers of those that are missing say what is left to do (`study.resume`).
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import json
-import platform
 import shlex
 import sys
 import time
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-import jax
 import polars as pl
-import pydantic
 
-from jaxbiped import __version__
-from jaxbiped.config import Model, config_hash, parse
+from jaxbiped.config import Model, config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
 from jaxbiped.study.lock import LOCK, FolderLock
+from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
 from jaxbiped.study.schema import SCHEMA, STRATEGIES, validate
 
-FORMAT = 1
-MANIFEST, ROWS = "manifest.json", "rows"
-UNREADABLE = (pl.exceptions.PolarsError, OSError, pydantic.ValidationError, ValueError)
-
-
-class Manifest(Model):
-    """What a results folder holds and how it came to be."""
-
-    format: int = FORMAT
-    state: Literal["running", "stopped", "finished"]
-    command: str
-    """The command line that wrote the folder."""
-    config: dict[str, Any]
-    """The resolved configuration."""
-    config_hash: str
-    versions: dict[str, str]
-    device: str
-    seed: int
-    arenas: int
-    """Arenas that the study is to have for each sweep point."""
-    started: str
-    """ISO 8601, UTC."""
-    wall_time: float | None = None
-    """Seconds from start to finish, compilation included."""
-    compile_time: float | None = None
-    """Seconds of compilation."""
-    shards: int | None = None
-    rows: int | None = None
-    """Rows in all shards, once finished."""
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that results may depend on."""
-    packages = {name: metadata.version(name) for name in ("jax", "jaxlib", "numpy", "mujoco")}
-    return {"jaxbiped": __version__, **packages, "python": platform.python_version()}
-
-
-def device() -> str:
-    """The devices of this process in words, such as "2 x cpu"."""
-    devices = jax.devices()
-    return f"{len(devices)} x {devices[0].device_kind}"
+POINTS, ROWS = "points.parquet", "rows"
 
 
 class Store:
@@ -84,6 +40,7 @@ class Store:
     def __init__(self, folder: Path, manifest: Manifest, lock: FolderLock, made: bool):
         self.folder, self.manifest, self.lock, self.made = folder, manifest, lock, made
         self.started = time.monotonic()
+        self.before = manifest.wall_time or 0.0, manifest.compile_time or 0.0  # [s] spent by the runs before this one
 
     def __enter__(self) -> Store:
         return self
@@ -91,8 +48,11 @@ class Store:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def append(self, frame: pl.DataFrame, shard: int | None = None) -> Path:
+    def append(self, frame: pl.DataFrame, shard: int | None = None, *, compile_time: float | None = None) -> Path:
         """Write rows as one shard, `rows/part-<shard>.parquet`; by default the next number.
+
+        With `compile_time` [s], of this run so far, the times in the manifest are brought up to date, so that they
+        outlive a run that is killed.
 
         Raises `InputError` when the rows do not fit the schema, the shard is there already, or the disk is full.
         """
@@ -104,18 +64,25 @@ class Store:
         buffer = io.BytesIO()  # polars would turn a full disk into an error of its own
         validate(frame).write_parquet(buffer)
         write_whole(path, lambda file: file.write(buffer.getvalue()))
+        if compile_time is not None:
+            self.write_manifest(**self.times(compile_time))
         return path
+
+    def times(self, compile_time: float | None, wall_time: float | None = None) -> dict[str, float | None]:
+        """Of the manifest: all runs' seconds, this run's being `wall_time`, by default those since it was opened."""
+        wall = time.monotonic() - self.started if wall_time is None else wall_time
+        spent = None if compile_time is None else self.before[1] + compile_time
+        return {"wall_time": self.before[0] + wall, "compile_time": spent}
 
     def done(self) -> set[int]:
         """Numbers of the shards that are written."""
         return {shard_number(path) for path in shard_paths(self.folder)}
 
     def finish(self, *, compile_time: float | None = None, wall_time: float | None = None) -> Manifest:
-        """Write the final manifest and let go of the folder. `wall_time` defaults to the time since `create`."""
+        """Write the final manifest and let go of the folder. Times are of this run; by default all of it."""
         rows = int(scan(self.folder).select(pl.len()).collect().item())
-        wall_time = time.monotonic() - self.started if wall_time is None else wall_time
-        update = {"wall_time": wall_time, "compile_time": compile_time, "shards": len(self.done()), "rows": rows}
-        self.write_manifest(state="finished", **update)
+        times = self.times(compile_time, wall_time)
+        self.write_manifest(state="finished", shards=len(self.done()), rows=rows, **times)
         self.close()
         return self.manifest
 
@@ -134,7 +101,8 @@ class Store:
                 if self.done():
                     self.write_manifest(state="stopped")
                 else:
-                    (self.folder / MANIFEST).unlink(missing_ok=True)
+                    for name in (MANIFEST, POINTS):
+                        (self.folder / name).unlink(missing_ok=True)
                     remove_if_empty(self.folder / ROWS)
         except (InputError, OSError):
             pass  # a full disk: "running" without a lock reads as stopped
@@ -145,13 +113,21 @@ class Store:
 
 
 def create(
-    folder: str | Path, config: Model, *, seed: int, arenas: int, command: str | None = None, device_name: str = ""
+    folder: str | Path,
+    config: Model,
+    *,
+    seed: int,
+    arenas: int,
+    points: pl.DataFrame | None = None,
+    command: str | None = None,
+    device_name: str = "",
 ) -> Store:
-    """Start a results folder: take its lock, write its manifest.
+    """Start a results folder: take its lock, write its sweep points and its manifest.
 
     Args:
       folder: must not exist, or be empty.
       config: the resolved configuration; its values and its hash are stored.
+      points: of a sweep: `point`, and a column for each field.
       command: the command line; by default this process's.
       device_name: by default the devices that JAX sees.
     """
@@ -184,11 +160,20 @@ def create(
     store = Store(folder, manifest, lock, made)
     try:
         (folder / ROWS).mkdir()
+        if points is not None:
+            write_points(folder, points)
         store.write_manifest()
     except (OSError, InputError) as error:
         store.close()
         raise as_input_error(folder, error) from None
     return store
+
+
+def write_points(folder: Path, points: pl.DataFrame) -> None:
+    """Write the sweep points."""
+    buffer = io.BytesIO()
+    points.write_parquet(buffer)
+    write_whole(folder / POINTS, lambda file: file.write(buffer.getvalue()))
 
 
 def as_input_error(folder: Path, error: OSError | InputError) -> InputError:
@@ -246,21 +231,24 @@ def scan(folder: str | Path) -> pl.LazyFrame:
     return pl.scan_parquet(paths) if paths else pl.LazyFrame(schema=SCHEMA)
 
 
-def read_manifest(folder: str | Path) -> Manifest:
-    """The manifest of a results folder; `InputError` when there is none, or none that this version reads."""
-    path = Path(folder) / MANIFEST
-    if not Path(folder).is_dir():
-        raise InputError("no such results folder", file=folder)
+def read_points(folder: str | Path) -> pl.DataFrame:
+    """The sweep points of a folder: `point` (Int32, rising from 0), and a column (Float64) for each field swept.
+
+    A study that sweeps nothing has one point, 0, and no fields.
+    """
+    read_manifest(folder)
+    path = Path(folder) / POINTS
+    if not path.exists():
+        return pl.DataFrame({"point": [0]}, schema={"point": pl.Int32})
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"is not a results folder; it has no {MANIFEST}", file=folder) from None
+        points = pl.read_parquet(path)
     except UNREADABLE as error:
-        raise InputError(f"is not valid JSON: {error}", file=path) from None
-    found = data.get("format") if isinstance(data, dict) else None
-    if found != FORMAT:
-        raise InputError(f"this version reads manifests of format {FORMAT}", file=path, field="format", value=found)
-    return parse(Manifest, data, file=path)
+        raise broken_shard(path, error) from None
+    fields = [name for name in points.columns if name != "point"]
+    wanted = {"point": pl.Int32, **dict.fromkeys(fields, pl.Float64)}
+    if dict(points.schema) != wanted or points["point"].to_list() != list(range(len(points))):
+        raise InputError("must hold `point`, rising from 0, and a column of numbers for each field swept", file=path)
+    return points
 
 
 def check_complete(folder: str | Path, manifest: Manifest, rows: int) -> None:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, UInt32
+from jaxtyping import Array, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.mission.footwork import WalkConfig
-from jaxbiped.mission.queue import Jobs, Result
+from jaxbiped.mission.queue import Jobs, OnProgress, Result
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.walking import walk
 
@@ -22,12 +20,14 @@ def walk_all(
     points: Settings,
     count: int,
     static: Program,
-    on_progress: Callable[[int], None],
+    on_progress: OnProgress,
     config: WalkConfig,
+    population_of: Int[np.ndarray, "P"],
 ) -> Result:
     """Every arena under every point, as `evaluate.run_all`: results [P, count], on the host."""
     kinds = jax.tree.leaves(points)[0].shape[0]
     point, arena = (grid.ravel() for grid in np.meshgrid(np.arange(kinds), np.arange(count), indexing="ij"))
-    jobs = Jobs(jnp.asarray(arena), jnp.asarray(point), seeds[arena], jnp.int32(len(arena)))
+    place = arena + seeds.shape[0] * population_of[point]
+    jobs = Jobs(jnp.asarray(place), jnp.asarray(point), seeds[arena], jnp.int32(len(arena)))
     result = walk(batch, points, jobs, static, config, on_progress)
     return jax.tree.map(lambda leaf: leaf.reshape(kinds, count), result)

@@ -57,7 +57,8 @@ def test_slots_workers_and_batch_do_not_matter(population, played):
         point = next(p for p, q in enumerate(points) if q is setting)
         assert_same(row(everything, (point, k)), row(played, k), OTHER_PROGRAM)
     assert not np.any(everything.code == Code.RUNNING)
-    assert ended[-1] == max(ended) == everything.code.size
+    assert ended[-1].ended == max(tally.ended for tally in ended) == everything.code.size
+    assert ended[-1].reached == np.sum(everything.code == Code.REACHED)
 
 
 def test_every_mission_ends_with_a_code_and_sound_numbers(played):

@@ -1,0 +1,66 @@
+"""A study from its config to a results folder, begun or gone on with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import polars as pl
+
+from jaxbiped.study import store
+from jaxbiped.study.clock import CompileClock
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.evaluate import Progress, evaluate
+from jaxbiped.study.groups import Point, Shard, group_points, only_point, shards
+from jaxbiped.study.resume import resume as take_up
+
+# Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.
+Engine = Callable[..., Iterator[tuple[Shard, pl.DataFrame]]]
+
+
+def conduct(
+    folder: str | Path,
+    config: StudyConfig,
+    *,
+    points: Sequence[Point] | None = None,
+    resume: bool = False,
+    on_progress: Callable[[Progress], None] | None = None,
+    engine: Engine = evaluate,
+) -> store.Manifest:
+    """Compute a study and store it, shard by shard. A process that dies loses at most the shard that it was at.
+
+    Args:
+      folder: must not exist or be empty; with `resume`, one where the same study was stopped, or none yet.
+      points: sweep points; by default the one of `config`.
+
+    Raises:
+      InputError: a folder that is not so, or a full disk; what was stored stays readable.
+    """
+    clock = CompileClock()
+    swept = points is not None
+    points = tuple(points) if swept else only_point(config)
+    kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
+    if resume:
+        results = take_up(folder, config, rows=shard_rows(config, points), **kind)
+    else:
+        results = store.create(folder, config, **kind)
+    with results:
+        for shard, frame in engine(config, on_progress, points=points, done=results.done()):
+            results.append(frame, shard.number, compile_time=clock.seconds)
+        return results.finish(compile_time=clock.seconds)
+
+
+def shard_rows(config: StudyConfig, points: Sequence[Point]) -> list[int]:
+    """Rows of each shard, by its number."""
+    sizes = [len(group.points) * len(config.strategies) for group in group_points(points, config.strategies)]
+    return [shard.count * sizes[shard.group] for shard in shards(config, len(sizes))]
+
+
+def table(points: Sequence[Point]) -> pl.DataFrame:
+    """Sweep points as they are stored (`store.read_points`)."""
+    names = list(points[0].values)
+    columns = {name: [float(point.values[name]) for point in points] for name in names}
+    return pl.DataFrame(
+        {"point": [point.index for point in points], **columns},
+        schema={"point": pl.Int32, **dict.fromkeys(names, pl.Float64)},
+    )

@@ -1,0 +1,39 @@
+"""What a study is asked for: its arenas, its strategies, and one kind of mission."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import pydantic
+import tyro
+
+from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.config import Model
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.study.schema import FAMILIES, STRATEGIES
+
+Family = Literal[FAMILIES]
+StrategyName = Literal[STRATEGIES]
+
+
+class StudyConfig(Model):
+    """Strategies compared on the same random arenas."""
+
+    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
+    """Arena k and its noise are functions of this seed and of k alone."""
+    arenas: Annotated[int, pydantic.Field(ge=1, le=100_000_000)] = 600
+    families: Annotated[tuple[Family, ...], pydantic.Field(min_length=1)] = FAMILIES
+    """They take turns: arena k is of family k modulo their number."""
+    strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
+    shard: Annotated[int, pydantic.Field(ge=1, le=65536)] = 1024
+    """Arenas that are computed, and written, together."""
+    population: PopulationConfig = PopulationConfig()
+    """What is the same in all arenas of a family, and not drawn."""
+    mission: Annotated[MissionConfig, tyro.conf.arg(name="")] = MissionConfig()
+
+    @pydantic.model_validator(mode="after")
+    def _distinct(self):
+        for name in ("families", "strategies"):
+            if len(set(getattr(self, name))) < len(getattr(self, name)):
+                raise ValueError(f"{name} must be named once each")
+        return self
