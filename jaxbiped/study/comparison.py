@@ -105,10 +105,7 @@ def compare(
     resamples: int = 4999,
     level: float = 0.95,
 ) -> Comparison:
-    """Compare the strategies of one sweep point.
-
-    Holm's correction runs over all p-values of a table: success, distance and time of all pairs, over all arenas, over
-    all families together, and over all difficulties together.
+    """Compare the strategies of one sweep point; see `compare_named`.
 
     Args:
       frame: rows of `schema.SCHEMA`.
@@ -123,6 +120,29 @@ def compare(
     pairs = default_pairs(strategies) if pairs is None else tuple(pairs)
     for name in {name for pair in pairs for name in pair} - present:
         raise InputError(f"must be one of {', '.join(strategies)}", field="pairs", value=name)
+    return compare_named(frame, strategies, pairs, point=point, seed=seed, resamples=resamples, level=level)
+
+
+def compare_named(
+    frame: pl.DataFrame,
+    names: Sequence[str],
+    pairs: Sequence[tuple[str, str]],
+    *,
+    point: int = 0,
+    seed: int = 0,
+    resamples: int = 4999,
+    level: float = 0.95,
+) -> Comparison:
+    """Compare whatever the column `strategy` names, arena by arena.
+
+    Holm's correction runs over all p-values of a table: success, distance and time of all pairs, over all arenas, over
+    all families together, and over all difficulties together.
+
+    Args:
+      frame: the columns of `schema.SCHEMA`; a row for each arena and name, at most.
+      names: in the order of tables.
+    """
+    strategies = tuple(names)
     rng = np.random.default_rng(seed)
     summaries, compared = [], []
     for stratum, rows in strata(frame):
@@ -183,10 +203,7 @@ def compare_pair(
     level: float,
 ) -> PairComparison:
     """Two strategies (name, rows) on the arenas that both have, in the order of the arenas."""
-    columns = ["arena", "success", "distance", "time"]
-    sides = [rows.select(columns) for _, rows in (first, second)]
-    both = sides[0].join(sides[1], on="arena", suffix="_second").sort("arena")
-    solved = both.filter(pl.col("success") & pl.col("success_second"))
+    both, solved = paired(first[1], second[1])
     a, b = both["success"].to_numpy(), both["success_second"].to_numpy()
     metrics = {
         name: metric_difference(
@@ -203,6 +220,16 @@ def compare_pair(
         second_only=int(np.sum(b & ~a)),
         **metrics,
     )
+
+
+def paired(first: pl.DataFrame, second: pl.DataFrame) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """The arenas that both have rows for, and of these the ones that both solved, in the order of the arenas.
+
+    The second's columns are `success_second`, `distance_second` and `time_second`.
+    """
+    columns = ["arena", "success", "distance", "time"]
+    both = first.select(columns).join(second.select(columns), on="arena", suffix="_second").sort("arena")
+    return both, both.filter(pl.col("success") & pl.col("success_second"))
 
 
 def corrected(pairs: Sequence[PairComparison]) -> tuple[PairComparison, ...]:

@@ -17,6 +17,7 @@ import polars as pl
 from jaxtyping import Float
 from scipy.special import lambertw
 
+from jaxbiped.study.comparison import paired
 from jaxbiped.study.intervals import NOTHING, Estimate
 
 FIRST_LOOK = 100  # samples: "asymptotic" means nothing before
@@ -58,13 +59,11 @@ def enough(watch: Watch, goal: Goal) -> bool:
 
 def look(watch: Watch, goal: Goal, frame: pl.DataFrame) -> Watch:
     """The watch after one more shard's rows; shards come once each, in any order that does not depend on results."""
-    sides = [frame.filter(pl.col("strategy") == name).sort("arena") for name in (goal.first, goal.second)]
-    both = sides[0].join(sides[1], on="arena", suffix="_second")
+    both, solved = paired(*(frame.filter(pl.col("strategy") == name) for name in (goal.first, goal.second)))
     watch = replace(watch, arenas=watch.arenas + len(both))
     if goal.measure == "success":
         samples = both["success"].to_numpy().astype(float) - both["success_second"].to_numpy()
     else:
-        solved = both.filter(pl.col("success") & pl.col("success_second"))
         samples = np.round(solved[goal.measure].to_numpy() - solved[f"{goal.measure}_second"].to_numpy(), 4)
     return observe(watch, goal, samples)
 
