@@ -27,6 +27,8 @@ COMMANDS = {
     "primitives": ("primitives", "PrimitivesArgs", "verify the motion primitives in simulation", False),
     "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
 }
+# What a command is when its first argument is a results folder: another module, other options.
+ON_FOLDERS = {"compare": ("stored", "StoredArgs")}
 WRONG_INPUT = 2  # exit status
 
 
@@ -64,6 +66,8 @@ def dispatch(name: str, rest: list[str]) -> int:
     import tyro
 
     module_name, options_name, _, takes_file = COMMANDS[name]
+    if name in ON_FOLDERS and rest and Path(rest[0]).is_dir():
+        (module_name, options_name), takes_file = ON_FOLDERS[name], False
     module = importlib.import_module(f"jaxbiped.commands.{module_name}")
     options: type[Model] = getattr(module, options_name)
     extra = {}
@@ -109,7 +113,7 @@ def one_line(box: str) -> InputError:
         place, name, what, value = model.groups()
         place = place.lstrip("-").removeprefix("mission.")
         field = ".".join(part for part in (place if place[:1].islower() else "", name) if part)
-        return InputError(f"{what.removeprefix('Value error, ')} (got {value})", field=f"--{field}")
+        return InputError(f"{what.removeprefix('Value error, ')} (got {value})", field=f"--{field.replace('_', '-')}")
     return InputError(message or "options that cannot be used")
 
 

@@ -146,6 +146,7 @@ def page_of(
     limitations: tuple[str, ...],
     commands: tuple[str, ...],
     more: tuple[Section, ...] = (),
+    warnings: tuple[str, ...] = (),
 ) -> Page:
     """The page of one comparison.
 
@@ -153,11 +154,9 @@ def page_of(
       frame: the rows that it was made from.
       commands: that made it.
       more: sections between the tables and the limitations.
+      warnings: what to know before anything else.
     """
     arenas = comparison.summary(comparison.strategies[0]).n
-    warnings = ()
-    if manifest.state != "finished":
-        warnings = (f"This study is not finished: it has {arenas:,} of {manifest.arenas:,} arenas.",)
     kicker = f"jaxbiped · {arenas:,} random arenas · seed {manifest.seed} · intervals at {100 * comparison.level:g} %"
     return Page(
         title=title,

@@ -69,6 +69,7 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -
         title=question(comparison) if comparison.question else "One strategy on random arenas",
         limitations=LIMITATIONS,
         commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
+        warnings=(() if manifest.state == "finished" else (unfinished(comparison, manifest),)),
     )
     texts = {PAGE: render(page), SUMMARY: summary(comparison, manifest, figures)}
     for name, text in texts.items():
@@ -84,9 +85,8 @@ def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str])
       figures: file names beside the summary, with captions.
     """
     lines = ["# Strategies compared", ""]
-    done = comparison.summary(comparison.strategies[0]).n
     if manifest.state != "finished":
-        lines += [f"**This study is not finished: it has {done} of {manifest.arenas} arenas.**", ""]
+        lines += [f"**{unfinished(comparison, manifest)}**", ""]
     sentences = answer(comparison)
     if sentences:
         lines += [
@@ -105,6 +105,12 @@ def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str])
         lines += [to_markdown(sheet)]
     lines += ["## Limitations", "", *(f"- {text}" for text in LIMITATIONS), ""]
     return "\n".join(lines + provenance(comparison, manifest))
+
+
+def unfinished(comparison: Comparison, manifest: Manifest) -> str:
+    """How far a study is that has not ended."""
+    done = comparison.summary(comparison.strategies[0]).n
+    return f"This study is not finished: it has {done} of {manifest.arenas} arenas."
 
 
 def question(comparison: Comparison) -> str:

@@ -1,0 +1,86 @@
+"""What is said about two stored sides: their tables, whether they are equivalent, and how many arenas more to take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from jaxbiped.report.answer import MEASURES, Measure
+from jaxbiped.report.tables import (
+    Sheet,
+    code_sheet,
+    pair_sheet,
+    short_stratum_sheet,
+    strategy_sheet,
+    stratum_sheet,
+    success_sheet,
+)
+from jaxbiped.report.words import NONE, brackets, p_cell, percent, signed
+from jaxbiped.study.comparison import Comparison
+from jaxbiped.study.equivalence import Equivalence
+from jaxbiped.study.pilot import Plan
+
+BY_NAME = {measure.name: measure for measure in MEASURES}
+
+
+def terminal_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
+    """Tables for a terminal: both sides, how their missions ended, their difference, and its strata."""
+    first, second = comparison.question
+    kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
+    strata = [short_stratum_sheet(comparison, first, second, kind) for kind in kinds]
+    return (strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison), *strata)
+
+
+def written_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
+    """The same tables with every p-value, for a file."""
+    first, second = comparison.question
+    kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
+    rates = [success_sheet(comparison, kind) for kind in kinds]
+    strata = [stratum_sheet(comparison, first, second, kind) for kind in kinds]
+    return (strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison), *rates, *strata)
+
+
+def equivalence_sheets(found: Sequence[Equivalence]) -> tuple[Sheet, ...]:
+    """A table for each measure that was tested: a row for each stratum."""
+    measures = dict.fromkeys(item.measure for item in found)
+    return tuple(
+        equivalence_sheet([item for item in found if item.measure == name], BY_NAME[name]) for name in measures
+    )
+
+
+def equivalence_sheet(found: Sequence[Equivalence], measure: Measure) -> Sheet:
+    """Of one measure."""
+    groups: dict[str, list[tuple[str, ...]]] = {}
+    for item in found:
+        value = item.difference
+        amount = signed(value.estimate * measure.scale if value.valid else None, measure.digits)
+        limits = brackets(value, measure.scale, measure.digits)
+        shown = NONE if value.p is None else "yes" if item.shown else "no"
+        name = f"difficulty {item.stratum.name}" if item.stratum.kind == "difficulty" else item.stratum.name
+        row = (name, str(value.n), amount, limits, p_cell(value.p_holm), shown)
+        groups.setdefault(item.stratum.kind, []).append(row)
+    margin, alpha = found[0].margin * measure.scale, found[0].alpha
+    columns = ("stratum", "arenas", "difference", f"{100 * (1 - 2 * alpha):g} % interval", "p (Holm)", "within")
+    test = "score tests (Tango)" if measure.name == "success" else "t tests (Schuirmann), on arenas that both solved"
+    notes = (
+        f"Two one-sided {test}: within, where the difference is shown to be less than the margin (p < {alpha:g}).",
+        "No test on fewer than two arenas, nor on arenas that are all alike.",
+    )
+    title = f"Equivalence in {measure.name}, margin {margin:g} {measure.unit}"
+    return Sheet(title, columns, tuple(tuple(rows) for rows in groups.values()), notes)
+
+
+def plan_sentences(plan: Plan, first: str, second: str) -> tuple[str, ...]:
+    """How many arenas, on what it rests, and how sure that is."""
+    measure = BY_NAME[plan.measure]
+    wanted = f"{plan.wanted * measure.scale:g} {measure.unit}"
+    start = f"{plan.arenas:,} arenas would show a difference of {wanted} in {measure.name} between {first} and {second}"
+    start += f" with a power of {100 * plan.power:g} %, at {100 * (1 - plan.alpha):g} %."
+    if measure.name == "success":
+        basis = f"In the pilot of {plan.pilot:,} arenas one alone solved {percent(plan.spread)} % of them (McNemar)."
+        high = f"Were it {percent(plan.spread_high)} %, the upper end of the 95 % interval"
+    else:
+        spread, upper = (f"{value * measure.scale:.{measure.digits}f}" for value in (plan.spread, plan.spread_high))
+        basis = f"In the pilot both solved {plan.solved:,} of {plan.pilot:,} arenas; their differences have a standard"
+        basis += f" deviation of {spread} {measure.unit} (paired t test)."
+        high = f"Were it {upper} {measure.unit}, the upper end of the 95 % interval"
+    return start, basis, f"{high}, {plan.arenas_high:,} would."
