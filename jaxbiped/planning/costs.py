@@ -86,10 +86,15 @@ def kind_cost(kind: Int8[Array, "*S"], costs: Costs, oblique: bool) -> Float[Arr
     return out
 
 
-def price_list(costs: Costs) -> Float[Array, "2 K *B"]:
-    """`kind_cost` of straight and of oblique moves of every kind."""
-    kinds = [jnp.full(jnp.shape(costs.c0), k, jnp.int8) for k in range(FORBIDDEN + 1)]
-    return jnp.stack([jnp.stack([kind_cost(k, costs, oblique) for k in kinds]) for oblique in (False, True)])
+def tables(costs: Costs, rules: Rules) -> tuple[Int8[Array, "B C"], Float[Array, "B 2 K"], Int8[Array, "B"]]:
+    """Costs and rules [B] as tables: the kind of a cell of each class, the cost of a straight and of an oblique move of
+    each kind, and whether corners may be cut."""
+
+    def each(count):
+        return jnp.broadcast_to(jnp.arange(count, dtype=jnp.int8)[:, None], (count, *costs.c0.shape))
+
+    prices = jnp.stack([kind_cost(each(FORBIDDEN + 1), costs, oblique) for oblique in (False, True)])
+    return cell_kinds(each(len(Cell)), rules).T, jnp.moveaxis(prices, -1, 0), rules.corner_cutting.astype(jnp.int8)
 
 
 def half_edges(

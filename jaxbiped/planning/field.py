@@ -15,10 +15,11 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled, wavefront
-from jaxbiped.planning.costs import Costs, Rules, cell_kinds, half_edges, price_list
+from jaxbiped.planning.costs import Costs, Rules, half_edges, tables
 
 METHODS = ("wavefront", *compiled.METHODS)
-CHUNK, CHUNK_LARGE = 32, 16  # arenas settled together, of small and of large grids: what fits the cache
+# arenas settled together, of small and of large grids: what fits the cache
+CHUNK, CHUNK_LARGE = compiled.LANES, compiled.LANES_LARGE
 PIECES = 4  # for each core, so that a slow piece does not leave the other cores idle
 LARGE = 1200  # cells; larger grids are summed in float64 (see `_solve`)
 HUGE, FEW = 1 << 17, 4  # cells from which on, and large grids at once below which, cells are settled one by one
@@ -94,17 +95,23 @@ def _field(inputs, method: str) -> CostToGo:
 
 def _from_grids(classes, levels, each, goal_ij) -> CostToGo:
     """Line sweeps, for which the kernel itself prices the edges of a few arenas at a time."""
-    costs, rules = each
-    costs, valid = _checked(costs)
-    kinds = cell_kinds(classes, jax.tree.map(lambda leaf: jnp.asarray(leaf)[:, None, None], rules))
-    if levels.dtype != jnp.int8:
-        levels = jnp.clip(levels, -128, 127).astype(jnp.int8)
-    goal_ij = jnp.where(valid[:, None], goal_ij, -1)
-    double = _is_large(classes)
+    read, valid = _tables(each)
+    goal_ij, double = jnp.where(valid[:, None], goal_ij, -1), _is_large(classes)
     with jax.enable_x64(double):
-        cutting = jnp.asarray(rules.corner_cutting)
-        cost, steps = compiled.settle_grids(kinds, levels, price_list(costs), cutting, goal_ij, double)
+        cost, steps = compiled.settle_grids(read, _bytes(classes), _bytes(levels), goal_ij, double)
         return CostToGo(cost, steps, valid)
+
+
+@jax.jit
+def _tables(each):
+    """`tables` of costs and rules, and which costs are valid."""
+    costs, valid = _checked(each[0])
+    return tables(costs, each[1]), valid
+
+
+def _bytes(grids):
+    """Classes or levels as int8; those beyond it are taken for its ends."""
+    return grids if grids.dtype == np.int8 else grids.clip(-128, 127).astype(np.int8)
 
 
 def _checked(costs: Costs):
@@ -136,29 +143,33 @@ def _on_all_cores(solve, inputs, method: str) -> CostToGo:
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(inputs))
     if traced or batch <= chunk or jax.default_backend() != "cpu":
         return solve(jax.tree.map(jnp.asarray, inputs), method)
-    inputs = jax.tree.map(np.asarray, inputs)
     size = min(batch, chunk * -(-batch // (chunk * PIECES * (os.cpu_count() or 1))))
-    out = CostToGo(
-        _aligned(inputs[0].shape[:1] + inputs[0].shape[-2:]), np.empty(batch, np.int32), np.empty(batch, bool)
-    )
+    shape = inputs[0].shape[:1] + inputs[0].shape[-2:]
+    out = CostToGo(compiled.aligned(shape, np.float32), np.empty(batch, np.int32), np.empty(batch, bool))
+    direct = solve is _field and method == "line_sweep"
+    inputs = _prepared(inputs, out) if direct else jax.tree.map(np.asarray, inputs)
 
     def piece(start):
         stop = min(start + size, batch)
-        part = jax.tree.map(lambda a: a[stop - size : stop], inputs)  # the last one overlaps: one program
-        found = solve(part, method)
-        jax.tree.map(lambda whole, a: np.copyto(whole[start:stop], np.asarray(a)[start - stop :]), out, found)
+        rows = slice(stop - size, stop)  # the last one overlaps the one before: one program
+        part = jax.tree.map(lambda a: a[rows], inputs)
+        if direct:
+            compiled.settle_arrays(*part, out.cost[rows], out.iterations[rows], _is_large(out.cost))
+        else:
+            jax.tree.map(lambda whole, a: np.copyto(whole[rows], a), out, solve(part, method))
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(piece, range(0, batch, size)))
-    return jax.tree.map(jnp.asarray, out)
+    return jax.device_put(out)  # which takes arrays over as they are, where `jnp.asarray` copies
 
 
-def _aligned(shape) -> Float[np.ndarray, "..."]:
-    """Room for float32 that JAX takes over as it is instead of copying it."""
-    size = 4 * int(np.prod(shape))
-    room = np.empty(size + 64, np.uint8)
-    start = -room.ctypes.data % 64
-    return room[start : start + size].view(np.float32).reshape(shape)
+def _prepared(inputs, out: CostToGo):
+    """Arguments of `compiled.settle_arrays`, all but its results; says in `out` which arenas are valid."""
+    classes, levels, each, goal_ij = inputs
+    read, out.converged[:] = _tables(each)
+    goal_ij = np.where(out.converged[:, None], goal_ij, -1).astype(np.int32)
+    grids = (np.ascontiguousarray(_bytes(np.asarray(a))) for a in (classes, levels))
+    return jax.tree.map(np.asarray, read), *grids, goal_ij
 
 
 def _is_large(grids) -> bool:

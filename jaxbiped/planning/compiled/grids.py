@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numba import carray, njit
 
+from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.compiled import foreign, line_sweep
-from jaxbiped.planning.compiled.vector import pricing, transposition
+from jaxbiped.planning.compiled.vector import pricing, translation, transposition
 from jaxbiped.planning.costs import FORBIDDEN
 
 KINDS = FORBIDDEN + 1  # of moves
+CLASSES = len(Cell)
+OBSTACLE = int(Cell.OBSTACLE)
 TILE = 16  # cells and arenas that change places together
 
 
@@ -53,44 +58,45 @@ def turning(lanes: int):
     return spread, gather
 
 
-def solver(lanes: int, dtype):
-    """Settles all arenas of a batch, `lanes` at a time, as `foreign.register` wants it.
+@cache
+def settler(lanes: int, dtype):
+    """The function `settle_all`, `lanes` arenas at a time, which adds up costs as `dtype`.
 
-    Arguments: kinds and levels of cells, int8 [B, H, W], B a multiple of `lanes`; prices float32 [B / lanes, 2, KINDS,
-    lanes] of straight and oblique moves of each kind; whether corners may be cut, int8 [B]; goals int32 [B, 2].
-    Results: cost float32 [B, H, W]; passes int32 [B]; and room to work in: `dtype` [cells * lanes], float32
-    [4 * cells * lanes] and int8 [2 * cells * lanes], where cells = (H + 2) * (W + 2).
+    `settle_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, cost, room, bytes, height, width)`, all
+    flat arrays but goals. Given for B >= lanes arenas: classes and levels of cells, int8 [B, H, W]; the kind of a cell
+    of each class, int8 [B, 5]; what moves of each kind cost, straight and oblique, float32 [B, 2, KINDS]; whether
+    corners may be cut, int8 [B]; goals int32 [B, 2]. Written: the cost to go, float32 [B, H, W], and passes, int32 [B].
+    Room to work in: `dtype` [size], float32 [4 * size], int8 [3 * size], with size = `room_size(height, width, lanes)`.
     """
     settle = line_sweep.sweeps(lanes)
     spread, gather = turning(lanes)
+    kind_of = translation(lanes, CLASSES, Cell.FLOOR)
     straight, oblique = pricing(lanes, oblique=False), pricing(lanes, oblique=True)
 
     @njit(nogil=True)
-    def solve(arguments, count, results):
-        dims = foreign.shape(results, 0)
-        batch, height, width = np.int64(dims[0]), np.int64(dims[1]), np.int64(dims[2])
-        line, size = (width + 2) * lanes, (height + 2) * (width + 2) * lanes
-        kinds = foreign.array(arguments, 0, batch * height * width, np.int8)
-        levels = foreign.array(arguments, 1, batch * height * width, np.int8)
-        prices = foreign.array(arguments, 2, batch * 2 * KINDS, np.float32)
-        cutting = foreign.array(arguments, 3, batch, np.int8)
-        goals = carray(foreign.pointer(foreign.data(arguments, 4)), (batch, 2), np.int32)
-        field = foreign.array(results, 0, batch * height * width, np.float32)
-        steps = foreign.array(results, 1, batch, np.int32)
-        cost = foreign.array(results, 2, size, dtype)
-        room = foreign.array(results, 3, 4 * size, np.float32)
-        grids = foreign.array(results, 4, 2 * size, np.int8)
-        kind, level = grids[:size], grids[size:]
-        kind[:], level[:] = FORBIDDEN, 0  # the ring stays so
-        edges = (room[:size], room[size : 2 * size], room[2 * size : 3 * size], room[3 * size :])
+    def settle_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, cost, room, bytes, height, width):
+        line, size = (width + 2) * lanes, room_size(height, width, lanes)
+        edges = (room[:size], room[size : 2 * size], room[2 * size : 3 * size], room[3 * size : 4 * size])
+        seen, level, kind = bytes[:size], bytes[size : 2 * size], bytes[2 * size :]
+        seen[:], level[:] = OBSTACLE, 0  # the ring stays so
+        table, price = np.empty(CLASSES * lanes, np.int8), np.empty(2 * KINDS * lanes, np.float32)
+        slant = price[KINDS * lanes :]
         ends = size - line - lanes  # from here on there is no cell below: nothing but ring
         for k in range(4):
             edges[k][ends:] = np.inf
-        for first in range(0, batch, lanes):
-            spread(kinds, first, height, width, kind)
+        batch = len(steps)
+        for start in range(0, batch, lanes):
+            first = min(start, batch - lanes)  # the last arenas overlap those before
+            for lane in range(lanes):
+                for k in range(CLASSES):
+                    table[k * lanes + lane] = kinds_of[(first + lane) * CLASSES + k]
+                for k in range(2 * KINDS):
+                    price[k * lanes + lane] = prices[(first + lane) * 2 * KINDS + k]
+            spread(classes, first, height, width, seen)
             spread(levels, first, height, width, level)
-            price, cut = prices[first * 2 * KINDS :], cutting[first:]
-            slant = price[KINDS * lanes :]
+            for n in range(0, size, lanes):
+                kind_of(seen, table, kind, n)
+            cut = cutting[first:]
             for n in range(0, ends, lanes):
                 below, right, left = n + line, n + lanes, max(n - lanes, 0)
                 straight(edges[0], n, kind, level, n, right, n, n, price, cut)
@@ -106,5 +112,39 @@ def solver(lanes: int, dtype):
                 edges + edges, goals[first : first + lanes], cost, 0, height, width, lanes, True
             )
             gather(cost, field, first, height, width)
+
+    return settle_all
+
+
+@njit(nogil=True)
+def room_size(height, width, lanes):
+    """Elements of a grid of `lanes` arenas with its ring."""
+    return (height + 2) * (width + 2) * lanes
+
+
+def solver(lanes: int, dtype):
+    """`settle_all` as `foreign.register` wants it: the first six arrays are arguments, the other five results."""
+    settle_all = settler(lanes, dtype)
+
+    @njit
+    def solve(arguments, count, results):
+        dims = foreign.shape(results, 0)
+        batch, height, width = np.int64(dims[0]), np.int64(dims[1]), np.int64(dims[2])
+        cells, size = batch * height * width, room_size(height, width, lanes)
+        settle_all(
+            foreign.array(arguments, 0, cells, np.int8),
+            foreign.array(arguments, 1, cells, np.int8),
+            foreign.array(arguments, 2, batch * CLASSES, np.int8),
+            foreign.array(arguments, 3, batch * 2 * KINDS, np.float32),
+            foreign.array(arguments, 4, batch, np.int8),
+            carray(foreign.pointer(foreign.data(arguments, 5)), (batch, 2), np.int32),
+            foreign.array(results, 0, cells, np.float32),
+            foreign.array(results, 1, batch, np.int32),
+            foreign.array(results, 2, size, dtype),
+            foreign.array(results, 3, 4 * size, np.float32),
+            foreign.array(results, 4, 3 * size, np.int8),
+            height,
+            width,
+        )
 
     return solve

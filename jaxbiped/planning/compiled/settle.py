@@ -11,6 +11,7 @@ import numpy as np
 from numba import carray, njit
 
 from jaxbiped.planning.compiled import dijkstra, foreign, grids, line_sweep
+from jaxbiped.planning.compiled.line_sweep import LANES, LANES_LARGE
 
 
 @njit
@@ -55,6 +56,7 @@ def solver(settle, lanes: int, dtype):
 
 
 METHODS = ("line_sweep", "dijkstra")
+LINE = 64  # [bytes] of the cache
 GRIDS = "grids"  # line sweeps straight from grids
 
 
@@ -72,7 +74,7 @@ def registered(kernel: str, double: bool) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call. "dijkstra" is always float64."""
     name = f"jaxbiped_{kernel}_{'float64' if double else 'float32'}"
     dtype = np.float64 if double else np.float32
-    lanes = 1 if kernel == "dijkstra" else line_sweep.LANES_LARGE if double else line_sweep.LANES
+    lanes = 1 if kernel == "dijkstra" else LANES_LARGE if double else LANES
     if kernel == GRIDS:
         foreign.register(name, grids.solver(lanes, dtype))
     else:
@@ -103,31 +105,48 @@ def settle(edges, goal_ij, method: str, double: bool):
     return cost[:batch], steps[:batch]
 
 
-def settle_grids(kinds, levels, prices, cutting, goal_ij, double: bool):
+def settle_grids(tables, classes, levels, goal_ij, double: bool):
     """`settle` by line sweeps, straight from grids, without ever holding the edges of more than a few arenas.
 
     Args:
-      kinds, levels: int8 [B, H, W], of cells as `costs.cell_kinds` has them, and their heights in steps.
-      prices: float32 [2, KINDS, B], of straight and oblique moves of each kind; none may be NaN or negative.
-      cutting: bool [B], whether corners may be cut.
+      tables: of each arena: the kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and
+        oblique, float32 [B, 2, KINDS], none NaN or negative; whether corners may be cut, int8 [B].
+      classes, levels: int8 [B, H, W].
     """
     name, lanes = target(GRIDS, double)
-    batch, height, width = kinds.shape
-    many = -(-batch // lanes) * lanes
-
-    def filled(array):
-        return jnp.pad(array, ((0, many - batch),) + ((0, 0),) * (array.ndim - 1))
-
-    prices = jnp.moveaxis(filled(jnp.moveaxis(prices, -1, 0)).reshape(many // lanes, lanes, 2, grids.KINDS), 1, -1)
-    goal_ij = jnp.pad(goal_ij.astype(jnp.int32), ((0, many - batch), (0, 0)), constant_values=-1)
-    size = (height + 2) * (width + 2) * lanes
+    batch, height, width = classes.shape
+    inputs = (classes, levels, *tables, goal_ij.astype(jnp.int32))
+    if batch < lanes:
+        inputs = [jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1)) for a in inputs]
+    many, size = max(batch, lanes), int(grids.room_size(height, width, lanes))
     results = (
         jax.ShapeDtypeStruct((many, height, width), jnp.float32),
         jax.ShapeDtypeStruct((many,), jnp.int32),
         jax.ShapeDtypeStruct((size,), jnp.float64 if double else jnp.float32),
         jax.ShapeDtypeStruct((4 * size,), jnp.float32),
-        jax.ShapeDtypeStruct((2 * size,), jnp.int8),
+        jax.ShapeDtypeStruct((3 * size,), jnp.int8),
     )
-    arguments = filled(kinds), filled(levels), prices, filled(cutting.astype(jnp.int8)), goal_ij
-    cost, steps, *_ = jax.ffi.ffi_call(name, results)(*arguments)
+    cost, steps, *_ = jax.ffi.ffi_call(name, results)(*inputs)
     return cost[:batch], steps[:batch]
+
+
+def settle_arrays(tables, classes, levels, goal_ij, cost, steps, double: bool) -> None:
+    """`settle_grids` of NumPy arrays, contiguous, of no fewer arenas than lanes; results go into `cost` and `steps`.
+
+    From other threads it runs at the same time.
+    """
+    lanes, dtype = (LANES_LARGE, np.float64) if double else (LANES, np.float32)
+    height, width = classes.shape[1:]
+    size = grids.room_size(height, width, lanes)
+    grids.settler(lanes, dtype)(
+        classes.ravel(), levels.ravel(), *(table.ravel() for table in tables), goal_ij, cost.ravel(), steps,
+        aligned(size, dtype), aligned(4 * size, np.float32), aligned(3 * size, np.int8), height, width,
+    )  # fmt: skip
+
+
+def aligned(shape, dtype) -> np.ndarray:
+    """An array, not filled, where vectors do not straddle lines of the cache; JAX takes it over without a copy."""
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    room = np.empty(size + LINE, np.uint8)
+    start = -room.ctypes.data % LINE
+    return room[start : start + size].view(dtype).reshape(shape)

@@ -37,6 +37,15 @@ class Vectors:
         pointer, align = self.place(kind, array, index)
         self.builder.store(value, pointer, align=align)
 
+    def chosen(self, key, size: int, default: int, kind, table):
+        """`table[key * lanes :]` for bytes `key`; that of `default` for keys not below `size`."""
+        result = self.load(kind, table, ir.Constant(WORD, default * self.lanes))
+        for k in range(size):
+            if k != default:
+                same = self.builder.icmp_signed("==", key, self.all(k))
+                result = self.builder.select(same, self.load(kind, table, ir.Constant(WORD, k * self.lanes)), result)
+        return result
+
     def all(self, value: int):
         """A vector of bytes, all of one value."""
         return ir.Constant(ir.VectorType(BYTE, self.lanes), [value] * self.lanes)
@@ -65,6 +74,24 @@ def relaxation(lanes: int):
         return types.uint64(cost, types.intp, types.intp, edges, types.intp), generate
 
     return relax
+
+
+def translation(lanes: int, size: int, default: int):
+    """The instruction `translate(keys, table, values, at)`: `values[at:]` becomes `table[k * lanes:]` for each key k in
+    `keys[at:]`, that of `default` for a key that is not below `size`."""
+
+    @intrinsic
+    def translate(typing_context, keys, table, values, at):
+        def generate(context, builder, signature, arguments):
+            vectors, given = Vectors(context, builder, lanes), signature.args
+            key = vectors.load(given[0], arguments[0], arguments[3])
+            value = vectors.chosen(key, size, default, given[1], arguments[1])
+            vectors.store(value, given[2], arguments[2], arguments[3])
+            return context.get_dummy_value()
+
+        return types.void(keys, table, values, types.intp), generate
+
+    return translate
 
 
 def pricing(lanes: int, oblique: bool):
@@ -102,9 +129,7 @@ def pricing(lanes: int, oblique: bool):
                 careful = equal(load(9, ir.Constant(WORD, 0)), 0)
                 blocked = builder.or_(builder.and_(one, two), builder.and_(builder.or_(one, two), careful))
                 kind = builder.select(blocked, vectors.all(FORBIDDEN), kind)
-            cost = load(8, ir.Constant(WORD, FORBIDDEN * lanes))
-            for k in range(FORBIDDEN):
-                cost = builder.select(equal(kind, k), load(8, ir.Constant(WORD, k * lanes)), cost)
+            cost = vectors.chosen(kind, FORBIDDEN, FORBIDDEN, given[8], arguments[8])
             vectors.store(cost, given[0], arguments[0], arguments[1])
             return context.get_dummy_value()
 
