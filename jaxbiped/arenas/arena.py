@@ -9,7 +9,8 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.geometry.boxes import Boxes
 
-CIRCLE, SQUARE = 0, 1  # kinds of landmark: a disc of 7.5 cm radius, a square of 5 cm (paper, 3.1)
+CIRCLE, SQUARE = 0, 1  # kinds of landmark
+DISC_RADIUS, SQUARE_SIDE = 0.075, 0.05  # [m] (paper, 3.1)
 
 
 @jax.tree_util.register_dataclass

@@ -15,6 +15,7 @@ import tyro
 from jaxbiped.arenas import load_scene
 from jaxbiped.config import Model, config_hash
 from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.mission.eyes import eyes_for
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.mission.stepped import Mission, run_logged
@@ -60,6 +61,7 @@ def main(args: RunArgs) -> int:
 
         rehearse(args.mission)
         play = partial(walk_logged, config=args.mission.walk)
+    eyes = eyes_for(args.mission)
     print(f"{name}, {args.strategy}, sensor {args.mission.sensor}, executor {args.mission.executor}, seed {args.seed}")
     print("   time   turn   ahead  primitive")
     mission = play(
@@ -68,6 +70,7 @@ def main(args: RunArgs) -> int:
         from_key(jax.random.key(args.seed)),
         static,
         on_decision=lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
+        eyes=eyes,
     )
     print(sentence(mission))
     with new_folder(out) as folder:

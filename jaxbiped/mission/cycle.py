@@ -30,13 +30,21 @@ ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid by
 
 
 def cycle(
-    world: World, mind: Mind, arena: Arena, settings: Settings, program: Program
+    world: World,
+    mind: Mind,
+    arena: Arena,
+    settings: Settings,
+    program: Program,
+    seen: tuple[View, Sightings] | None = None,
 ) -> tuple[World, Mind, View, Command, Thought]:
     """Every mission of the batch, one decision on. Missions that have ended do not change.
 
     Consumes channels SENSE and ODOMETRY of each mission's seed, counted by its decisions.
+
+    Args:
+      seen: what each robot has just measured; None: measure here, by a sensor that is JAX.
     """
-    view, thinking, command, verdict, thought = think(world, mind, arena, settings, program)
+    view, thinking, command, verdict, thought = think(world, mind, arena, settings, program, seen=seen)
     executed = jax.vmap(EXECUTORS[program.executor])(arena, world, command, settings)
     after, moved = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, thinking, command, verdict, executed, arena, settings, program
@@ -47,17 +55,25 @@ def cycle(
 
 
 def think(
-    world: World, mind: Mind, arena: Arena, settings: Settings, program: Program, carriage: Carriage | None = None
+    world: World,
+    mind: Mind,
+    arena: Arena,
+    settings: Settings,
+    program: Program,
+    carriage: Carriage | None = None,
+    seen: tuple[View, Sightings] | None = None,
 ) -> tuple[View, Mind, Command, Int[Array, "B"], Thought]:
     """Sense and decide, for a batch: the view, and what `decide` returns. Consumes channel SENSE.
 
     Args:
       carriage: [B] how each robot really holds its body; None: upright where it stands, but for a tilt that the
         sensor draws.
+      seen: what each robot has just measured; None: measure here.
     """
-    sensed = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, arena, settings, program, carriage)
+    if seen is None:
+        seen = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, arena, settings, program, carriage)
     # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
-    view, sightings = jax.lax.optimization_barrier(sensed)
+    view, sightings = jax.lax.optimization_barrier(seen)
     if program.sensor == "oracle":
         mind = replace(mind, belief=replace(mind.belief, pose=on_level(world.pose, program)))
     return view, *decide(mind, view, sightings, arena, settings, program)

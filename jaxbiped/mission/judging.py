@@ -23,6 +23,7 @@ from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.sensing.hashing import fold
 from jaxbiped.sensing.odometry import drift
+from jaxbiped.sensing.view import Sightings, View
 
 HINDERED, TWISTED = 0.02, 0.1  # [m, rad] off where a command leads: something was in the way
 PATIENCE = 2  # commands in a row that were hindered before the robot believes its feet
@@ -86,24 +87,63 @@ def judge_and_think(
 ) -> tuple[World, Mind, Mind, Plan, Thought]:
     """The referee looks at what came of each robot's plan, and each robot makes its next one.
 
+    Returns:
+      The world and the mind after what was done; the mind after the next measurement; the next plan; the thought.
+    """
+    world, mind, times = judge(world, mind, plan, after, fell, collided, arena, settings, program)
+    return world, mind, *think_on(world, mind, times, carriage, arena, settings, program)
+
+
+@partial(jax.jit, static_argnames=("program",))
+def judge(
+    world: World,
+    mind: Mind,
+    plan: Plan,
+    after: Pose,
+    fell: Bool[Array, "n"],
+    collided: Bool[Array, "n"],
+    arena: Arena,
+    settings: Settings,
+    program: Program,
+) -> tuple[World, Mind, Int[Array, "n"]]:
+    """The referee looks at what came of each robot's plan.
+
     Deviation: the paper's robot knows nothing but what it sees. Here, feet that were stopped `PATIENCE` times in a row,
     by an edge that the map has elsewhere, make the robot step back and plan round that cell.
 
     Returns:
-      The world and the mind after what was done; the mind after the next measurement; the next plan; the thought.
+      The world and the mind after what was done; how many commands in a row something was in the way of.
     """
     executed = jax.vmap(carried_out)(world, plan.command, after, fell, collided, arena, settings)
     done = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, mind, plan.command, plan.verdict, executed, arena, settings, program
     )
     times = jnp.where(plan.some & hindered(plan.command, executed.moved), plan.hindered + 1, 0)
-    stuck = times >= PATIENCE
     felt = jax.vmap(feel, in_axes=(0, 0, 0, None))(done[1], mind.belief.pose, plan.command, program.spec)
-    done = done[0], choose_rows(stuck, felt, done[1])
-    world, mind = choose_rows(plan.some, done, (world, mind))
-    _, thinking, command, verdict, thought = think(world, mind, arena, settings, program, carriage)
+    done = done[0], choose_rows(times >= PATIENCE, felt, done[1])
+    return *choose_rows(plan.some, done, (world, mind)), times
+
+
+@partial(jax.jit, static_argnames=("program",))
+def think_on(
+    world: World,
+    mind: Mind,
+    times: Int[Array, "n"],
+    carriage: Carriage,
+    arena: Arena,
+    settings: Settings,
+    program: Program,
+    seen: tuple[View, Sightings] | None = None,
+) -> tuple[Mind, Plan, Thought]:
+    """Each robot measures, or has `seen`, and makes its next plan; `times` is what `judge` returned.
+
+    Returns:
+      The mind after the measurement; the plan; the thought.
+    """
+    _, thinking, command, verdict, thought = think(world, mind, arena, settings, program, carriage, seen)
+    stuck = times >= PATIENCE
     command = choose_rows(stuck & (verdict == Code.RUNNING), back_off(command), command)
-    return world, mind, thinking, Plan(command, verdict, jnp.ones_like(plan.some), jnp.where(stuck, 0, times)), thought
+    return thinking, Plan(command, verdict, jnp.ones_like(stuck), jnp.where(stuck, 0, times)), thought
 
 
 def hindered(command: Command, moved: Float[Array, "n 3"]) -> Bool[Array, "n"]:

@@ -68,7 +68,8 @@ class LimitConfig(Model):
 class MissionConfig(Model):
     """One kind of mission. Every default is the paper's value, or named where it is chosen."""
 
-    sensor: Literal["raycast", "oracle"] = "raycast"
+    sensor: Literal["raycast", "oracle", "stereo"] = "raycast"
+    """`stereo`: pairs of pictures, rendered and matched on the host."""
     preset: Literal["ideal", "rendered", "real"] = "rendered"
     """How well the camera measures: the default of each number of `stereo` and `landmarks`."""
     executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"

@@ -16,6 +16,7 @@ from jaxbiped.arenas.arena import CIRCLE, Arena
 from jaxbiped.mapping import Cell
 from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import Thought, nearest_direction
+from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.log import Mark, MissionLog, Outline
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
@@ -63,14 +64,20 @@ def run_logged(
     seed: UInt32[Array, ""],
     program: Program,
     on_decision: Callable[[Played], None] = lambda _: None,
+    eyes: Eyes | None = None,
 ) -> Mission:
-    """Run one mission (no batch axis) as the compiled driver would, and keep what it saw and thought."""
+    """Run one mission (no batch axis) as the compiled driver would, and keep what it saw and thought.
+
+    Args:
+      eyes: what it sees with, where the program's sensor is no JAX.
+    """
     batch = jax.tree.map(lambda leaf: leaf[None], (arena, settings))
     world, mind = jax.tree.map(lambda leaf: leaf[None], start(arena, settings, seed, program.spec))
-    recorder = Recorder(settings, program, on_decision)
+    recorder = Recorder(settings, program, on_decision, eyes)
     while world.code[0] == Code.RUNNING:
         before = world
-        world, mind, _, command, thought = turn_once(world, mind, *batch, program)
+        seen = eyes.see(world, mind, *batch) if eyes else None
+        world, mind, _, command, thought = turn_once(world, mind, *batch, program, seen)
         recorder.decided(0, before, command, thought)
         recorder.concluded(0, world, mind)
     return recorder.mission(arena, world)
@@ -79,8 +86,10 @@ def run_logged(
 class Recorder:
     """Keeps what one mission saw and thought; worlds, minds and so on have a leading axis of 1."""
 
-    def __init__(self, settings: Settings, program: Program, on_decision: Callable[[Played], None]):
-        self.settings, self.program, self.on_decision = settings, program, on_decision
+    def __init__(
+        self, settings: Settings, program: Program, on_decision: Callable[[Played], None], eyes: Eyes | None = None
+    ):
+        self.settings, self.program, self.on_decision, self.eyes = settings, program, on_decision, eyes
         self.moments: list[dict] = []
         self.played: list[Played] = []
         self.action = "Start"

@@ -23,8 +23,19 @@ from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import GridSpec
 from jaxbiped.mission.decision import Thought
+from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.footwork import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
-from jaxbiped.mission.judging import Plan, choose_rows, fresh, gather, judge_and_think, no_plan, scatter
+from jaxbiped.mission.judging import (
+    Plan,
+    choose_rows,
+    fresh,
+    gather,
+    judge,
+    judge_and_think,
+    no_plan,
+    scatter,
+    think_on,
+)
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, OnProgress, Result, tally
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
@@ -59,12 +70,14 @@ def walk(
     config: WalkConfig,
     on_progress: OnProgress = lambda tally: None,
     observer: Observer | None = None,
+    eyes: Eyes | None = None,
 ) -> Result:
     """Work a queue of missions off; `program.executor` names the physics.
 
     Args:
       arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
       on_progress: called with the tally of the jobs.
+      eyes: what robots see with, where the program's sensor is no JAX.
 
     Returns:
       Results in the order of the jobs, on the host; padding stays RUNNING.
@@ -72,7 +85,7 @@ def walk(
     Raises:
       InputError: a device that is not there, or a biped that cannot play its primitives.
     """
-    return Walkers(arenas, settings, jobs, program, config, observer).work(on_progress)
+    return Walkers(arenas, settings, jobs, program, config, observer, eyes).work(on_progress)
 
 
 def walk_logged(
@@ -82,14 +95,16 @@ def walk_logged(
     program: Program,
     config: WalkConfig,
     on_decision: Callable[[Played], None] = lambda _: None,
+    eyes: Eyes | None = None,
 ) -> Mission:
     """One mission of a simulated biped, with a log of everything; as `stepped.run_logged` gives it."""
     arenas, points, world = jax.tree.map(
         lambda leaf: jnp.asarray(leaf)[None], (arena, settings, start(arena, settings, seed, program.spec)[0])
     )
     zero = jnp.zeros(1, jnp.int32)
-    recorder = Recorder(settings, program, on_decision)
-    walk(arenas, points, Jobs(zero, zero, jnp.asarray(seed)[None], jnp.int32(1)), program, config, observer=recorder)
+    recorder = Recorder(settings, program, on_decision, eyes)
+    jobs = Jobs(zero, zero, jnp.asarray(seed)[None], jnp.int32(1))
+    walk(arenas, points, jobs, program, config, observer=recorder, eyes=eyes)
     return recorder.mission(arena, world)
 
 
@@ -119,9 +134,9 @@ def rehearse(config: MissionConfig) -> None:
 class Walkers:
     """The slots, and the queue that they work off."""
 
-    def __init__(self, arenas, settings, jobs, program: Program, config: WalkConfig, observer: Observer | None):
+    def __init__(self, arenas, settings, jobs, program: Program, config: WalkConfig, observer=None, eyes=None):
         self.arenas, self.settings, self.jobs = arenas, settings, jobs
-        self.program, self.config, self.observer = program, config, observer
+        self.program, self.config, self.observer, self.eyes = program, config, observer, eyes
         self.arena_of, self.point_of = np.asarray(jobs.arena), np.asarray(jobs.point)
         self.count = int(jobs.count)
         self.step, self.rise = np.asarray(settings.body.step), np.asarray(settings.limits.rise)
@@ -173,9 +188,15 @@ class Walkers:
         arena = gather(self.arenas, self.arena_of[self.job[rows]])
         setting = gather(self.settings, self.point_of[self.job[rows]])
         ends = self.stage.fell[rows], self.stage.collided[rows]
-        world, moved, mind, following, thought = judge_and_think(
-            world, mind, plan, Pose(*feet), carriage, *ends, arena, setting, self.program
-        )
+        done = world, mind, plan, Pose(*feet)
+        if self.eyes:
+            world, moved, times = judge(*done, *ends, arena, setting, self.program)
+            seen = self.eyes.see(world, moved, arena, setting, carriage, len(ids))
+            mind, following, thought = think_on(world, moved, times, carriage, arena, setting, self.program, seen)
+        else:
+            world, moved, mind, following, thought = judge_and_think(
+                *done, carriage, *ends, arena, setting, self.program
+            )
         mine = np.where(np.arange(ROWS) < len(ids), rows, len(self.job))
         slots = self.world, self.mind, self.plan
         self.world, self.mind, self.plan = scatter(slots, mine, (world, mind, following))

@@ -15,6 +15,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from jaxbiped.arenas.arena import DISC_RADIUS, SQUARE_SIDE
 from jaxbiped.files import write_whole
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
@@ -31,7 +32,6 @@ BUMP_SHADES = ("#7db1e6", "#4a8ad4", "#2763ab")  # one step from the base floor,
 PLAN, TRACK, INK = "#118a2e", "#222222", "#333333"
 OUTLINES = {"obstacle": "#8e1f1c", "bump": "#163f75", "gate": "#5b2a86"}
 GOAL_RADIUS = 0.10  # [m] "reached" (paper, 3.1)
-DISC_RADIUS, SQUARE_SIDE = 0.075, 0.05  # [m] landmarks (paper, 3.1)
 MOST_CELLS_LINED = 6000  # beyond, cells are too small for lines around them and numbers in them
 MOST_ARROWS = 150  # beyond, a plan is a line
 

@@ -115,6 +115,8 @@ class CameraConfig(Model):
     """[m] of the optical centre ahead of the robot's vertical axis."""
     num_disparities: int = Field(160, ge=16, le=1024, multiple_of=16)
     """[px] search range of the matcher; sets the nearest distance that can be measured."""
+    image_noise: float = Field(1.5, ge=0, le=64)
+    """Standard deviation of each channel of each pixel, in grey levels of 256 (rendered sensor)."""
 
     @model_validator(mode="after")
     def check_whole(self) -> CameraConfig:

@@ -1,0 +1,78 @@
+"""Missions that see on the host: the same as those that see inside the compiled loop, whatever they see with."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.arenas.scene import load_scene
+from jaxbiped.mission.cycle import sense
+from jaxbiped.mission.eyes import eyes_for, where
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.state import start
+from jaxbiped.mission.stepped import run_logged
+from jaxbiped.sensing import camera as cameras
+from tests.mission.conftest import CONFIG, PROGRAM
+
+by_ray_cast = jax.jit(jax.vmap(partial(sense, program=PROGRAM, carriage=None)))
+
+
+class Mirror:
+    """Eyes that measure on the host what the ray-cast sensor would inside the loop."""
+
+    def see(self, world, mind, arena, settings, carriage=None, count=None):
+        return jax.device_get(by_ray_cast(world, mind, arena, settings))
+
+    def picture(self):
+        return None
+
+
+@pytest.mark.slow
+def test_mission_that_is_given_what_it_sees(population, played):
+    arena, setting, seed = (jax.tree.map(jnp.asarray, part[0]) for part in population[:3])
+    mission = run_logged(arena, setting, seed, PROGRAM, eyes=Mirror())
+    assert mission.code == played.code[0] and mission.measurements == played.measurements[0]
+    assert mission.distance == pytest.approx(played.distance[0], 1e-5)
+
+
+def test_jax_sensors_need_no_eyes():
+    assert eyes_for(CONFIG) is None and eyes_for(MissionConfig(sensor="oracle")) is None
+
+
+@pytest.fixture(scope="module")
+def first_look(request):
+    """World, mind, arena and settings of one mission before its first measurement."""
+    _, arena = load_scene(request.config.rootpath / "configs" / "scenes" / "experiment_6.toml")
+    settings = MissionConfig(sensor="stereo").settings("full")
+    world, mind = start(arena, settings, jnp.uint32(7), PROGRAM.spec)
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (world, mind, arena, settings))
+
+
+def test_camera_is_where_the_ray_cast_sensor_has_it(first_look):
+    """Place, tilt and seed are those that `sense` uses: the centre of a robot upright, turned by at most a few sd."""
+    world, mind, _, settings = first_look
+    origin, basis, at, _ = where(world, mind, settings, None)
+    pose, at = jax.tree.map(lambda v: v[0], (world.pose, at))
+    level = cameras.placed(pose, at, 0 * at.pitch, 0 * at.pitch)
+    np.testing.assert_allclose(origin[0], level[0], atol=0.365 * 4 * np.deg2rad(0.3))
+    turned = np.arccos(np.clip((np.trace(np.asarray(basis[0]).T @ np.asarray(level[1])) - 1) / 2, -1, 1))
+    assert 0 < turned < 6 * np.deg2rad(0.3)
+
+
+def test_rendered_view_agrees_with_the_ray_cast_one(first_look):
+    """Heights of the floor and the walls, as both sensors see them in one place with the same tilt."""
+    eyes = eyes_for(MissionConfig(sensor="stereo"))
+    try:
+        seen, _ = eyes.see(*first_look)
+        again, _ = eyes.see(*first_look)
+    finally:
+        eyes.close()
+    cast, _ = by_ray_cast(*first_look)
+    assert np.array_equal(seen.z, again.z)
+    for view in (seen, cast):
+        near = (np.asarray(view.weight[0]) > 0) & (np.abs(view.x[0] - 0.35) < 0.05) & (np.abs(view.y[0]) < 0.1)
+        assert abs(np.median(np.asarray(view.z[0])[near])) < 0.01
+    shares = [np.sum(view.weight) / (512 * 384) for view in (seen, cast)]
+    assert abs(shares[0] - shares[1]) < 0.1
