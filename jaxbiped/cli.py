@@ -25,6 +25,7 @@ COMMANDS = {
     "run": ("run", "RunArgs", "run one mission in a scene, with pictures", False),
     "plan": ("plan", "PlanArgs", "plan on a map that you have: Moving AI, ROS map_server, class grid", False),
     "primitives": ("primitives", "PrimitivesArgs", "verify the motion primitives in simulation", False),
+    "tune": ("tune", "TuneArgs", "tune the costs on random arenas, and judge them on others", True),
     "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
 }
 # What a command is when its first argument is a results folder: another module, other options.

@@ -1,0 +1,102 @@
+"""Costs from the execution times of the primitives, as the paper decided on its own (3.1)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import nnls
+
+from jaxbiped.mission.library import LibraryConfig
+from jaxbiped.motion.primitives import CELL, Command, DurationConfig, Primitive, duration
+
+FLOOR_CELL = 2.0  # what a straight move on the floor costs in the paper: C0 + C1
+KINDS = {  # primitive: which of C1 to C3 its move pays, and how it climbs
+    Primitive.STRAIGHT_FORWARD: (1, 0),
+    Primitive.PASS_GATE: (2, 0),
+    Primitive.STEP_UP_BUMP: (3, 1),
+    Primitive.STEP_DOWN_BUMP: (3, -1),
+}
+OBLIQUE = (1.0, math.sqrt(2.0))  # straight and oblique moves, in cells
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Costs that durations stand for."""
+
+    costs: Float[np.ndarray, "4"]  # C0 to C3, scaled so that a straight floor move costs 2, as in the paper
+    seconds: float  # of a unit
+    moves: tuple[str, ...]
+    measured: Float[np.ndarray, "n"]  # [s] of these moves
+    fitted: Float[np.ndarray, "n"]  # [s]
+
+
+def table_2(library: LibraryConfig) -> DurationConfig:
+    """Measured primitives in the units of Table 2: 5 cm forward, 45 degrees, one step 5 cm forward, 5 cm of a gate.
+
+    What a measured primitive carries the robot further than that is walked straight, as in `motion.duration`. Without
+    a measured `gate`, the squatting walk stands for it. What a measurement takes is not measured there: the default.
+    """
+    entry = library.primitives
+    pace = entry["straight"].duration / (entry["straight"].request[0] / CELL)
+    gate = entry.get("gate", entry["squat_straight"])
+
+    def step(name: str) -> float:
+        cells = entry[name].request[0] / CELL
+        return max(entry[name].duration - max(cells - math.sqrt(2.0), 0.0) * pace, 0.0)
+
+    return DurationConfig(
+        straight=pace,
+        turn=entry["turn"].duration / (abs(entry["turn"].request[2]) / (math.pi / 4)),
+        step_up=step("step_up"),
+        step_down=step("step_down"),
+        pass_gate=gate.duration / (gate.request[0] / CELL),
+    )
+
+
+def fit(durations: DurationConfig, *, oblique: bool = True, measuring: bool = False) -> Fit:
+    """Least squares of what moves take [s] against what they cost (paper, Eq. 1).
+
+    The moves are those of the grid: on the floor, in a gate, one step up, one step down; each straight and, with
+    `oblique`, oblique. Costs are not negative. C4 cannot come from durations: an unmeasured cell takes a further
+    measurement, and whatever turns out to be there.
+
+    Args:
+      oblique: without, only the sums C0 + C1, C0 + C2 and C0 + C3 are determined; C1 is then C0, as in the paper.
+      measuring: a move takes the measurement that follows it, too.
+
+    Raises:
+      ValueError: a straight move on the floor takes no time.
+    """
+    features, seconds, names = [], [], []
+    for primitive, (paid, rise) in KINDS.items():
+        for length in OBLIQUE if oblique else OBLIQUE[:1]:
+            row = np.zeros(4)
+            row[0] = length
+            row[paid] = 1.0
+            command = Command(
+                turn=jnp.zeros(1),
+                primitive=jnp.full(1, int(primitive)),
+                length=jnp.full(1, length * CELL),
+                rise=jnp.full(1, rise),
+                squat=jnp.zeros(1, bool),
+            )
+            spent = float(duration(command, jax.tree.map(lambda leaf: leaf[None], durations.traced()))[0])
+            features.append(row)
+            seconds.append(spent + measuring * durations.measure)
+            names.append(f"{primitive.name.lower()}{'' if length == 1 else ' oblique'}")
+    design, measured = np.array(features), np.array(seconds)
+    if oblique:
+        found, _ = nnls(design, measured)
+    else:
+        merged = np.column_stack([design[:, 0] + design[:, 1], design[:, 2:]])
+        both, _ = nnls(merged, measured)
+        found = np.array([both[0], *both])
+    unit = (found[0] + found[1]) / FLOOR_CELL
+    if unit <= 0:
+        raise ValueError("a straight move on the floor must take time")
+    return Fit(found / unit, float(unit), tuple(names), measured, design @ found)
