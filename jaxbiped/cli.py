@@ -24,6 +24,8 @@ COMMANDS = {
     "compare": ("compare", "CompareArgs", "compare strategies on random arenas, with statistics", True),
     "run": ("run", "RunArgs", "run one mission in a scene, with pictures", False),
     "plan": ("plan", "PlanArgs", "plan on a map that you have: Moving AI, ROS map_server, class grid", False),
+    "stereo": ("stereo", "StereoArgs", "map what a real stereo pair shows", False),
+    "classify": ("classify", "ClassifyArgs", "map a point cloud", False),
     "primitives": ("primitives", "PrimitivesArgs", "verify the motion primitives in simulation", False),
     "tune": ("tune", "TuneArgs", "tune the costs on random arenas, and judge them on others", True),
     "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),

@@ -32,7 +32,7 @@ def refused(capsys, *argv: str) -> str:
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        (["walk"], ["must be one of compare, run, plan, primitives, report", "walk"]),
+        (["walk"], ["must be one of " + ", ".join(cli.COMMANDS), "walk"]),
         (["run"], ["Missing", "PATH"]),
         (["run", SCENE, "--speed", "3"], ["Unrecognized", "--speed"]),
         (["run", SCENE, "--strategy", "brave"], ["--strategy", "brave", "floor_only"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from jaxbiped.sensing.stereo.calibration import StereoCamera
 from jaxbiped.sensing.stereo.matching import Disparity
 
 LEAST = 1.0 / 16  # [px] disparity of what is too far to have a distance
+USEFUL = 2.0, 27.2  # [m] to which maps are made of the paper's camera, of so many [px m] of focal length times baseline
 
 
 class Points(NamedTuple):
@@ -41,3 +43,8 @@ def to_points(disparity: Disparity, camera: StereoCamera) -> Points:
     x = ((np.arange(width) - camera.centre[0]) / camera.focal).astype(np.float32) * z
     y = ((np.arange(height) - camera.centre[1]) / camera.focal).astype(np.float32)[:, None] * z
     return Points(*(values.reshape(-1) for values in (x, y, z, known.astype(np.float32))))
+
+
+def useful_range(camera: StereoCamera) -> float:
+    """[m] at which depth is as uncertain as at 2 m in the paper's camera: noise of depth grows as z^2 / (f b)."""
+    return USEFUL[0] * math.sqrt(camera.focal * camera.baseline / USEFUL[1])

@@ -1,0 +1,90 @@
+"""What `stereo` and `classify` share: from points that stand upright to a map, its files and its pictures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+from jaxtyping import Float
+from pydantic import Field
+
+from jaxbiped.config import Model
+from jaxbiped.files import write_whole
+from jaxbiped.mapping import class_grid
+from jaxbiped.mapping.chart import CHART, PIXELS, Chart, lay_out, make_chart
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.mapping.params import MapConfig
+from jaxbiped.motion.robot import RobotConfig
+
+Metres = Annotated[float, Field(ge=-1e9, le=1e9)]
+Area = Annotated[tuple[Metres, Metres, Metres, Metres] | None, tyro.conf.arg(metavar="X0 X1 Y0 Y1")]
+Folder = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
+
+
+class ChartArgs(Model):
+    """Options of both commands."""
+
+    pitch: float = Field(0.05, ge=0.005, le=10.0)
+    """[m] Side of a cell."""
+    area: Area = None
+    """[m] What to map. Default: what the points cover."""
+    robot: RobotConfig = RobotConfig()
+    """The robot that the map is for."""
+    map: MapConfig = CHART
+    """Thresholds of the map, in pixels; 1 cm2 of surface counts as 8."""
+    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    """Of the search for the floor."""
+    out: Folder = None
+    """Folder to write, which must not exist. Default: results/<command>-<hash of these options>."""
+
+
+def chart(
+    points: Float[np.ndarray, "N 3"], args: ChartArgs, away_xy: tuple[float, float] = (0.0, 0.0), sparse: bool = False
+) -> Chart:
+    """The map of points that stand upright; (x, y) = `away_xy` [m] is their origin on it."""
+    area = None
+    if args.area is not None:
+        area = tuple(side - away_xy[k // 2] for k, side in enumerate(args.area))
+    spec, origin_xy = lay_out(points, args.pitch, area=area)
+    made = make_chart(points, spec, origin_xy, args.robot.body(), args.map, sparse=sparse)
+    grid = made.grid
+    moved = class_grid.ClassGrid(grid.classes, grid.levels, grid.origin_xy + np.array(away_xy, float), grid.pitch)
+    return Chart(moved, made.surface, made.spec)
+
+
+def say_map(made: Chart) -> str:
+    """Its size and its cells, for people."""
+    rows, columns = made.grid.shape
+    count = {cell.name.lower(): int((made.grid.classes == cell).sum()) for cell in Cell}
+    cells = ", ".join(f"{number} {name}" for name, number in count.items() if number)
+    return f"{columns} x {rows} cells of {made.grid.pitch:g} m ({cells})"
+
+
+def write_chart(
+    made: Chart, folder: Path, args: ChartArgs, title: str, camera_xy: tuple[float, float] | None = None
+) -> list[str]:
+    """Fill a folder with the 2D grid, the 3D grid and their pictures; return the names of the files."""
+    from jaxbiped.report import measured  # loads matplotlib
+
+    spec = made.spec
+    class_grid.save(made.grid, folder / "classes.npz")
+    arrays = {
+        "surface_cm2": made.surface,
+        "origin_xy": made.grid.origin_xy,
+        "pitch": spec.pitch,
+        "level_height": spec.level_height,
+        "lowest": spec.lowest,
+    }
+    write_whole(folder / "voxels.npz", lambda file: np.savez_compressed(file, **arrays))
+    occupied = made.surface * PIXELS >= max(args.map.voxel_points * spec.cell_share, PIXELS)
+    measured.save_voxels(folder / "voxels.png", occupied, spec.pitch, spec.level_height, spec.lowest, title=title)
+    measured.save_classes(folder / "map.png", made.grid, title=title, camera_xy=camera_xy)
+    return ["classes.npz", "voxels.npz", "voxels.png", "map.png"]
+
+
+def write_json(path: Path, data: dict) -> None:
+    """Write `data` as JSON, whole or not at all."""
+    write_whole(path, lambda file: file.write((json.dumps(data, indent=2) + "\n").encode()))

@@ -1,0 +1,118 @@
+"""`jaxbiped classify`: a map of a point cloud."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+from pydantic import Field
+
+from jaxbiped.commands.charting import ChartArgs, Metres, chart, say_map, write_chart, write_json
+from jaxbiped.config import config_hash
+from jaxbiped.errors import InputError
+from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.mapping.upright import FRAMES, Upright, find_upright, set_upright
+from jaxbiped.sensing import cloud as clouds
+from jaxbiped.sensing.cloud import Cloud
+
+Component = Annotated[float, Field(ge=-1e6, le=1e6)]
+Vector = Annotated[tuple[Component, Component, Component] | None, tyro.conf.arg(metavar="X Y Z")]
+
+
+class ClassifyArgs(ChartArgs):
+    """Map a point cloud: 3D grid and class grid, with pictures."""
+
+    cloud: tyro.conf.Positional[Path]
+    """The cloud, .npz (points [N, 3], or x, y, z), .npy, .ply or .pcd."""
+    scale: Annotated[float, Field(gt=0, le=1e4)] = 1.0
+    """[m] One unit of the cloud; 0.001 for millimetres."""
+    up: Vector = None
+    """The direction against gravity in the cloud's frame. Default: found, z or else y or -y within 30 degrees."""
+    tilt: Annotated[float, Field(ge=0, le=60)] = 10.0
+    """[deg] by which --up may be off; 0 to take it as it is."""
+    floor: Annotated[Metres | None, tyro.conf.arg(metavar="FLOAT")] = None
+    """[m] Height of the floor along --up, which is then taken as it is. Default: found."""
+
+
+def main(args: ClassifyArgs) -> int:
+    """Run the command.
+
+    Returns:
+      Exit status 0.
+
+    Raises:
+      InputError: a cloud that cannot be used (none, damaged, empty, too wide for the pitch), options that do not go
+        together, no floor, a folder that exists or cannot be written.
+    """
+    out = args.out or Path("results") / f"classify-{config_hash(args.model_copy(update={'out': None}))}"
+    refuse_existing(out)
+    check_options(args)
+    start = time.perf_counter()
+    cloud = clouds.load(args.cloud, args.scale)
+    upright = stand(cloud, args)
+    away = FRAMES[upright.frame] @ cloud.origin  # in double precision; the points' own coordinates are small
+    made = chart(upright.apply(cloud.points), args, (float(away[0]), float(away[1])), sparse=True)
+    seconds = time.perf_counter() - start
+
+    print(f"cloud     {args.cloud}: {len(cloud.points)} points{dropped(cloud)}")
+    if cloud.origin.any():
+        print(f"origin    far from 0: computed from {', '.join(f'{v:.0f}' for v in cloud.origin)} m")
+    print(f"floor     {say_floor(upright, cloud)}")
+    print(f"map       {say_map(made)}, in {seconds:.1f} s")
+    T = np.eye(4)
+    T[:3, :3] = upright.R
+    T[:3, 3] = upright.shift - upright.R @ cloud.origin + np.array([away[0], away[1], 0])
+    with new_folder(out) as folder:
+        names = write_chart(made, folder, args, args.cloud.name)
+        summary = {
+            "config": args.model_dump(mode="json"),
+            "points": len(cloud.points),
+            "dropped": cloud.dropped,
+            "origin": cloud.origin.tolist(),
+            "floor_found": upright.floor is not None,
+            "T_map_cloud": T.tolist(),
+        }
+        write_json(folder / "classify.json", summary)
+    print(f"written   {out}: {', '.join([*names, 'classify.json'])}")
+    return 0
+
+
+def check_options(args: ClassifyArgs) -> None:
+    """Raise `InputError` unless the options go together."""
+    if args.floor is not None and args.up is None:
+        raise InputError("goes with --up only", field="floor", value=args.floor)
+    if args.up is not None and not math.hypot(*args.up) > 0:
+        raise InputError("must not be 0 0 0", field="up", value=args.up)
+
+
+def stand(cloud: Cloud, args: ClassifyArgs) -> Upright:
+    """How the cloud is set upright; raise `InputError` when it shows no floor."""
+    up = None if args.up is None else np.array(args.up) / math.hypot(*args.up)
+    if args.floor is not None:
+        return set_upright(up, args.floor - float(up @ cloud.origin), np.median(cloud.points, axis=0).astype(float))
+    upright = find_upright(cloud.points, up, math.radians(args.tilt), seed=args.seed)
+    if upright is None:
+        known = "--floor" if up is not None else "--up X Y Z, and --floor where the floor is not in it"
+        raise InputError(f"shows no floor that could be found; give {known}", file=args.cloud)
+    return upright
+
+
+def dropped(cloud: Cloud) -> str:
+    """What is said of points that were not finite."""
+    return f"; {cloud.dropped} that are NaN or infinite dropped" if cloud.dropped else ""
+
+
+def say_floor(upright: Upright, cloud: Cloud) -> str:
+    """How the cloud was set upright, for people."""
+    if upright.floor is None:
+        return f"given: {upright.frame} is up"
+    floor = upright.floor
+    height = floor.offset + float(floor.up @ cloud.origin)
+    return (
+        f"found: {upright.frame} is up but for {math.degrees(upright.tilt):.2f} degrees, height {height:.3f} m; "
+        f"{floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm"
+    )

@@ -1,0 +1,158 @@
+"""`jaxbiped stereo`: a map of what a real stereo pair shows."""
+
+from __future__ import annotations
+
+import math
+import time
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import tyro
+from pydantic import Field
+
+from jaxbiped.commands.charting import ChartArgs, chart, say_map, write_chart, write_json
+from jaxbiped.config import config_hash
+from jaxbiped.errors import InputError
+from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.mapping.floor import Floor, find_floor
+from jaxbiped.sensing.cloud import save_ply
+from jaxbiped.sensing.stereo.calibration_files import load_rig
+from jaxbiped.sensing.stereo.images import as_rgb, load_pair
+from jaxbiped.sensing.stereo.matching import MatchParams, match
+from jaxbiped.sensing.stereo.order import check_order
+from jaxbiped.sensing.stereo.points import to_points, useful_range
+from jaxbiped.sensing.stereo.rectify import Rig
+
+UNKNOWN_CONE = math.radians(65.0)  # of a camera that is held upright, pitched by any angle
+KNOWN_CONE = math.radians(5.0)  # that a pose from the camera file may be off
+HEIGHT_OFF = 0.15  # of the height of the camera file, or 5 cm, that the floor may be off
+
+
+class StereoArgs(ChartArgs):
+    """Map what a stereo pair shows: points, 3D grid and class grid, with pictures."""
+
+    left: tyro.conf.Positional[Path]
+    """The picture of the left camera: PNG, JPEG, TIFF, PGM, ...; grey or colour, 8 or 16 bits."""
+    right: tyro.conf.Positional[Path]
+    """That of the right camera."""
+    camera: Annotated[Path, tyro.conf.arg(metavar="FILE")]
+    """Calibration: .toml, OpenCV's .yaml or .xml, or Middlebury's calib.txt."""
+    max_range: Annotated[float | None, Field(gt=0, le=1000), tyro.conf.arg(metavar="FLOAT")] = None
+    """[m] Drop what is further off. Default: where depth is as uncertain as at 2 m in the paper's camera."""
+    num_disparities: Annotated[int | None, Field(ge=16, le=2048, multiple_of=16), tyro.conf.arg(metavar="INT")] = None
+    """[px] Search range. Default: the camera file's, else --match's."""
+    match: MatchParams = MatchParams()
+    """Numbers of the matcher."""
+
+
+def main(args: StereoArgs) -> int:
+    """Run the command.
+
+    Returns:
+      Exit status 0.
+
+    Raises:
+      InputError: pictures or a calibration that cannot be used (none, damaged, blank, of different size, swapped, not
+        rectified), no floor in view and no pose in the camera file, a folder that exists or cannot be written.
+    """
+    out = args.out or Path("results") / f"stereo-{config_hash(args.model_copy(update={'out': None}))}"
+    refuse_existing(out)
+    left, right = load_pair(args.left, args.right)
+    rig = load_rig(args.camera, (left.shape[1], left.shape[0]))
+    left, right = rig.rectify(left, right)
+    params = args.match
+    searched = args.num_disparities or rig.num_disparities
+    if searched:
+        params = params.model_copy(update={"num_disparities": searched})
+    check_order(left, right, params)
+    start = time.perf_counter()
+    disparity = match(left, right, params)
+    seconds = time.perf_counter() - start
+    camera = rig.camera
+    x, y, z, weight = to_points(disparity, camera)
+    reach = args.max_range or useful_range(camera)
+    points = np.stack([x, y, z], axis=1)
+    kept = (weight > 0) & ((points**2).sum(1) < reach**2)
+    points = points[kept]
+    if not len(points):
+        message = f"must show something within {reach:.3g} m (--max-range); nothing was measured there"
+        raise InputError(message, file=args.left)
+    up, height, floor = attitude(points, rig, args)
+    R = level_frame(up)
+    points = points @ R.T.astype(np.float32) + np.array([0, 0, height], np.float32)
+    made = chart(points, args)
+
+    pitch, roll = math.asin(-up[2]), math.atan2(-up[0], -up[1])
+    nearest = camera.focal * camera.baseline / max(params.min_disparity + params.num_disparities - 1 + camera.doffs, 1)
+    print(f"pair      {args.left}, {args.right}: {camera.size[0]} x {camera.size[1]} px")
+    print(
+        f"camera    {args.camera}: focal length {camera.focal:.6g} px, baseline {camera.baseline:.4g} m; measures from "
+        f"{nearest:.2f} to {reach:.2f} m"
+    )
+    print(f"matched   {disparity.valid.mean():.1%} of the pixels, in {seconds:.2f} s; {len(points)} points in range")
+    print(
+        f"{'floor' if floor else 'pose'}     {' ' * (not floor)}"
+        f"{'found' if floor else 'of the camera file, for no floor was found'}: camera {height:.3f} m high, pitched "
+        f"{math.degrees(pitch):.2f} and rolled {math.degrees(roll):.2f} degrees"
+        + (f"; {floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm" if floor else "")
+    )
+    print(f"map       {say_map(made)}")
+    with new_folder(out) as folder:
+        from jaxbiped.report import measured  # loads matplotlib
+
+        save_ply(folder / "points.ply", points, as_rgb(left)[kept])
+        measured.save_disparity(folder / "disparity.png", left, disparity.value, disparity.valid)
+        names = write_chart(made, folder, args, args.left.name, camera_xy=(0.0, 0.0))
+        write_json(
+            folder / "stereo.json",
+            {
+                "config": args.model_dump(mode="json"),
+                "camera": vars(camera),
+                "num_disparities": params.num_disparities,
+                "measured": float(disparity.valid.mean()),
+                "floor_found": floor is not None,
+                "T_map_camera": transform(R, height),
+                "pitch_degrees": math.degrees(pitch),
+                "roll_degrees": math.degrees(roll),
+                "height": height,
+            },
+        )
+    print(f"written   {out}: {', '.join(['points.ply', 'disparity.png', *names, 'stereo.json'])}")
+    return 0
+
+
+def attitude(points: np.ndarray, rig: Rig, args: StereoArgs) -> tuple[np.ndarray, float, Floor | None]:
+    """Up in the rectified camera frame, height [m] of the camera over the floor, and the floor if it was found.
+
+    A pose of the camera file is refined by the floor that it agrees with. Without one, the camera is taken to be held
+    upright, and the floor to be below it.
+    """
+    given = rig.up
+    cone = UNKNOWN_CONE if given is None else KNOWN_CONE
+    about = np.array([0.0, -1.0, 0.0]) if given is None else given
+    floor = find_floor(points, about, cone, above=np.zeros(3), seed=args.seed)
+    said = None if rig.pose is None else rig.pose.height
+    if floor is not None and said is not None and abs(-floor.offset - said) > max(HEIGHT_OFF * said, 0.05):
+        floor = None
+    if floor is not None:
+        return floor.up, -floor.offset, floor
+    if given is None or said is None:
+        message = "shows no floor that could be found; give pitch and height of the camera as [pose] of the camera file"
+        raise InputError(message, file=args.left)
+    return given, said, None
+
+
+def level_frame(up: np.ndarray) -> np.ndarray:
+    """Rotation [3, 3] of the camera frame to x ahead (or, for a camera that looks straight down, as its top), z up."""
+    ahead = np.array([0.0, 0.0, 1.0]) if abs(up[2]) < 0.99 else np.array([0.0, -1.0, 0.0])
+    x = ahead - (ahead @ up) * up
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(up, x), up])
+
+
+def transform(R: np.ndarray, height: float) -> list[list[float]]:
+    """The rigid motion [4, 4] from the rectified camera frame to that of the map."""
+    T = np.eye(4)
+    T[:3, :3], T[2, 3] = R, height
+    return T.tolist()

@@ -1,0 +1,173 @@
+"""A map of whatever a cloud of points covers: one look, or a whole scan, on a grid laid out for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Float32
+
+from jaxbiped.errors import InputError
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.mapping.grid import MOST_CELLS, Body, Cell, GridSpec
+from jaxbiped.mapping.gridmap import classify, empty, update
+from jaxbiped.mapping.params import MapConfig
+from jaxbiped.sensing.view import View
+
+AT_ONCE = 1_000_000  # points that are put into voxels at a time: memory stays bounded
+CUBE = 0.01  # [m] points of one cube this wide count once
+PIXELS = 8.0  # pixels that 1 cm2 of surface is worth, in the thresholds of `MapConfig`
+COVERED = 12.5  # [cm2] of 5 x 5 cm that a scan is taken to cover; sparser ones count for more
+
+
+CHART = MapConfig(solid_points=80.0)
+"""Thresholds for surfaces: one look at random arenas, with the noise of a real pair, is read best so."""
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The 3D grid and the 2D grid of one cloud."""
+
+    grid: ClassGrid
+    surface: Float32[np.ndarray, "H W Z"]  # [cm2] seen in each voxel
+    spec: GridSpec  # its cell (0, 0) has its outer corner at `grid.origin_xy`
+
+
+def lay_out(
+    points: Float[np.ndarray, "N 3"],
+    pitch: float,
+    *,
+    heights: tuple[float, float] = (-0.045, 0.5),
+    area: tuple[float, float, float, float] | None = None,
+) -> tuple[GridSpec, tuple[float, float]]:
+    """A grid that holds all points whose height [m] is within `heights`, and the place of its corner (x, y) [m].
+
+    Borders are whole multiples of the pitch.
+
+    Args:
+      points: [m] z up, the floor at 0.
+      pitch: [m] side of a cell.
+      heights: [m] what is lower or higher is of no interest.
+      area: (least x, greatest x, least y, greatest y) [m] in place of what the points cover.
+
+    Raises:
+      InputError: no point is that near to the floor; an area that is none, or of too many cells.
+    """
+    if area is None:
+        low = np.array([np.inf, np.inf])
+        high = -low
+        for some in chunks(len(points)):
+            part = points[some]
+            part = part[(part[:, 2] > heights[0]) & (part[:, 2] < heights[1])]
+            if len(part):
+                low, high = np.minimum(low, part[:, :2].min(0)), np.maximum(high, part[:, :2].max(0))
+        if not np.isfinite(low).all():
+            message = f"must hold points from {heights[0]:g} to {heights[1]:g} m over the floor; none is there"
+            raise InputError(message, field="cloud")
+    else:
+        low, high = np.array(area[0::2], float), np.array(area[1::2], float)
+        if not (np.isfinite([low, high]).all() and (low < high).all()):
+            raise InputError("must be finite, X0 < X1 and Y0 < Y1", field="area", value=area)
+    first = np.floor(low / pitch + 1e-9)
+    cells = np.maximum(np.ceil(high / pitch - 1e-9) - first, 1)
+    if area is None:
+        cells = np.floor(high / pitch + 1e-6) - first + 1  # a point on the upper border is inside
+    if not cells.prod() <= MOST_CELLS:
+        wide, deep = cells * pitch
+        message = (
+            f"must give at most {MOST_CELLS:,} cells on the {wide:.6g} x {deep:.6g} m of the cloud; "
+            "a larger --pitch or a smaller --area does (and --scale, where the cloud is not in metres)"
+        )
+        raise InputError(message, field="pitch", value=pitch)
+    columns, rows = (int(n) for n in cells)
+    spec = GridSpec(size_x=columns * pitch, size_y=rows * pitch, pitch=pitch)
+    return spec, (float(first[0] * pitch), float(first[1] * pitch))
+
+
+def cover_voxels(
+    points: Float[np.ndarray, "N 3"], spec: GridSpec, origin_xy: tuple[float, float]
+) -> Float32[np.ndarray, "H W Z"]:
+    """Surface [cm2] seen in each voxel, however densely: its cubes of about 1 cm that hold a point.
+
+    Points that are not finite, or outside the grid, count nothing.
+    """
+    (rows, columns), depth = spec.shape, spec.levels
+    sides = np.array([max(round(side / CUBE), 2) for side in (spec.pitch, spec.pitch, spec.level_height)])
+    corner = np.array([*origin_xy, (spec.lowest - 0.5) * spec.level_height])
+    unit = np.array([spec.pitch, spec.pitch, spec.level_height]) / sides
+    cubes = np.array([columns, rows, depth]) * sides
+    keys = np.zeros(0, np.int64)
+    for some in chunks(len(points)):
+        part = np.asarray(points[some], np.float64)
+        with np.errstate(invalid="ignore"):
+            index = np.floor((part - corner) / unit)
+            inside = ((index >= 0) & (index < cubes)).all(1)
+        x, y, z = index[inside].astype(np.int64).T
+        keys = np.union1d(keys, (y * cubes[0] + x) * cubes[2] + z)
+    z, x, y = keys % cubes[2], keys // cubes[2] % cubes[0], keys // cubes[2] // cubes[0]
+    voxel = (y // sides[1] * columns + x // sides[0]) * depth + z // sides[2]
+    count = np.bincount(voxel, minlength=rows * columns * depth)
+    return (count * (unit[0] * unit[1] / CUBE**2)).astype(np.float32).reshape(rows, columns, depth)
+
+
+def make_chart(
+    points: Float[np.ndarray, "N 3"],
+    spec: GridSpec,
+    origin_xy: tuple[float, float],
+    body: Body,
+    config: MapConfig,
+    *,
+    sparse: bool = False,
+) -> Chart:
+    """The map of one cloud, by the rules of `mapping.update` and `mapping.classify` as for one view.
+
+    What counts is the surface that points cover, not their number: one look holds a hundred times as many pixels near
+    by as far off, and a scan has a density of its own. With pixels, a threshold that keeps phantoms out near by leaves
+    walls out far off. And a cell is floor, bump or gate only where its ground was seen: with one look there is no other
+    that would tell of what stands below a table.
+
+    Args:
+      points: [m] z up, the floor at 0; any number of them, finite or not.
+      spec, origin_xy: the grid (`lay_out`).
+      body: the robot that it is read for.
+      config: thresholds; `max_range` is not looked at. `CHART` is made for this.
+      sparse: count surfaces for more where the cloud is so sparse that it covers less than half of a typical cell.
+    """
+    surface = cover_voxels(points, spec, origin_xy)
+    evidence = surface * PIXELS
+    if sparse and surface.any():
+        best = surface.max(-1)
+        evidence *= max(COVERED * spec.cell_share / float(np.median(best[best > 0])), 1.0)
+    i, j, k = np.nonzero(evidence)
+    slots = 1 << max(len(i) - 1, 1).bit_length()  # powers of two, so that few sizes are ever compiled
+    padded = np.zeros((4, slots), np.float32)
+    padded[:, : len(i)] = (
+        (j + 0.5) * spec.pitch,
+        (i + 0.5) * spec.pitch,
+        (k + spec.lowest) * spec.level_height,
+        evidence[i, j, k],
+    )
+    params = replace(config.params(), max_range=jnp.float32(math.inf))
+    classes, levels = (np.array(values) for values in read(View(*padded), body, params, spec=spec))
+    ground = evidence[..., : spec.ground_levels - spec.lowest].sum(-1)
+    unseen = (ground < config.voxel_points * spec.cell_share) & (classes != Cell.OBSTACLE)
+    classes[unseen], levels[unseen] = Cell.UNMEASURED, 0
+    grid = ClassGrid(classes, levels, np.array(origin_xy, np.float64), spec.pitch)
+    return Chart(grid, surface, spec)
+
+
+@partial(jax.jit, static_argnames="spec")
+def read(view, body, params, *, spec):
+    """Classes and levels of one view from the grid's corner."""
+    here = Pose(*(jnp.float32(0),) * 4)
+    return classify(update(empty(spec), view, here, body, params, spec, refit=False), params, spec)
+
+
+def chunks(count: int):
+    """Slices of at most AT_ONCE."""
+    return (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
