@@ -22,6 +22,7 @@ from jaxbiped.errors import InputError
 # command: (module, options, one line, whether a TOML file may come first and give the defaults)
 COMMANDS = {
     "compare": ("compare", "CompareArgs", "compare strategies on random arenas, with statistics", True),
+    "sweep": ("sweep", "SweepArgs", "sweep numbers of the config, many points in one program", True),
     "run": ("run", "RunArgs", "run one mission in a scene, with pictures", False),
     "plan": ("plan", "PlanArgs", "plan on a map that you have: Moving AI, ROS map_server, class grid", False),
     "stereo": ("stereo", "StereoArgs", "map what a real stereo pair shows", False),

@@ -54,7 +54,8 @@ def input_error(error: pydantic.ValidationError, *, file: str | Path | None = No
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
         message = "unknown key"
-    return InputError(message, file=file, field=field, value=first["input"])
+    value = None if first["type"] == "told" else first["input"]  # whose message says it
+    return InputError(message, file=file, field=field, value=value)
 
 
 def config_hash(model: Model) -> str:

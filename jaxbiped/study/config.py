@@ -36,4 +36,6 @@ class StudyConfig(Model):
         for name in ("families", "strategies"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
                 raise ValueError(f"{name} must be named once each")
+        if self.population != PopulationConfig() and "bump" not in self.families:
+            raise ValueError("population fixes bumps, and needs the family bump")
         return self

@@ -85,6 +85,7 @@ def compute(config: StudyConfig, group: Group, shard: Shard, on_progress: OnProg
     result = play(
         batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
     )
+    batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
     plan = plan_all(batch, group, size)
     return frame(np.arange(shard.first, shard.first + shard.count), batch, group, config.strategies, result, plan)
 
@@ -173,7 +174,7 @@ def run_all(
 
 
 def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
-    """The oracle plans of all points [P * S] on the arenas [A] of their populations, on the host."""
+    """The oracle plans of all points [P * S] on the arenas [A] of their populations, all on the host."""
     kinds = len(group.population_of)
     out = OraclePlan(np.zeros((kinds, size), bool), *(np.zeros((kinds, size), np.float32) for _ in range(2)))
     for population in np.unique(group.population_of):
@@ -194,9 +195,9 @@ def frame(
     result: Result,
     plan: OraclePlan,
 ) -> pl.DataFrame:
-    """Rows of all points and strategies on arenas `index`, the first of the batch."""
+    """Rows of all points and strategies on arenas `index`, the first of the batch, which is on the host."""
     count, kinds = len(index), len(group.population_of)
-    family, difficulty = jax.device_get((batch.family[:count], batch.difficulty[:count]))
+    family, difficulty = batch.family[:count], batch.difficulty[:count]
     reached = result.code == Code.REACHED
     reachable, cost, length = (values[:, :count] for values in (plan.reachable, plan.cost, plan.length))
     columns = {

@@ -51,6 +51,8 @@ def refused(capsys, *argv: str) -> str:
         (["compare", "--sensor", "lidar"], ["--sensor", "lidar", "raycast"]),
         (["compare", "--executor", "robot"], ["--executor", "robot", "kinematic"]),
         (["report", "nowhere"], ["nowhere"]),
+        (["sweep"], ["needs [[axes]] or [sobol]"]),
+        (["sweep", "missing.toml"], ["missing.toml", "no such file"]),
     ],
 )
 def test_options(here, capsys, argv, said):
@@ -125,7 +127,7 @@ def test_compare_writes_its_folder_and_report_reads_it(here, capsys):
     manifest = json.loads((here / "mine" / "manifest.json").read_text())
     assert manifest["state"] == "finished" and manifest["arenas"] == 24 and "out" not in manifest["config"]
     summary = (here / "mine" / "summary.md").read_text()
-    assert cli.main(["report", "mine"]) == 0
+    assert cli.main(["report", "mine", "--examples", "0"]) == 0
     assert (here / "mine" / "summary.md").read_text() == summary
     assert "full" in capsys.readouterr().out
 

@@ -1,0 +1,68 @@
+"""`jaxbiped sweep`: a study over many points of its config, many of them in one compiled program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from jaxbiped.commands.progress import progress
+from jaxbiped.config import config_hash
+from jaxbiped.errors import InputError
+from jaxbiped.files import refuse_existing
+from jaxbiped.mission.settings import SIMULATED
+from jaxbiped.study.conduct import conduct
+from jaxbiped.study.evaluate import WORKERS
+from jaxbiped.study.groups import group_points
+from jaxbiped.study.memory import check_memory
+from jaxbiped.study.sweep import SweepConfig
+
+
+class SweepArgs(SweepConfig):
+    """Sweep numbers of the config: missions on the same random arenas at each point, tables and figures.
+
+    The sweep in TOML comes first, such as sweeps/costs.toml; options on the command line override it.
+    """
+
+    out: Path | None = None
+    """Folder to write, which must not exist. Default: results/sweep-<hash of the sweep>."""
+    resume: bool = False
+    """Go on with the same sweep in the folder, where it was stopped; or begin it."""
+
+
+def main(args: SweepArgs) -> int:
+    """Run the command.
+
+    Returns:
+      Exit status 0.
+
+    Raises:
+      InputError: a sweep that cannot be run, a folder that exists or cannot be written, a full disk.
+    """
+    config = SweepConfig.model_validate(args.model_dump(exclude={"out", "resume"}))
+    if not config.fields():
+        raise InputError(
+            "a sweep needs [[axes]] or [sobol] in its file: jaxbiped sweep sweeps/costs.toml", field="axes"
+        )
+    points = tuple(config.points())
+    groups = group_points(points, config.strategies)
+    for group in groups:
+        arenas = min(config.shard, config.arenas)
+        check_memory(group.static, len(group.points), len(config.strategies), arenas, WORKERS)
+    if config.mission.executor in SIMULATED:
+        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+
+        for point in points:
+            rehearse(point.mission)
+    out = args.out or Path("results") / f"sweep-{config_hash(config)}"
+    if not args.resume:
+        refuse_existing(out)
+    console = Console()
+    programs = f"{len(groups)} compiled program{'s' * (len(groups) > 1)}"
+    what = f"{len(points)} sweep points in {programs}, {config.arenas} arenas each, seed {config.seed}"
+    console.print(f"{what}: {', '.join(config.strategies)}", highlight=False)
+    with progress(console) as show:
+        manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show)
+    spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
+    console.print(f"{manifest.rows} missions in {spent}; written {out}", highlight=False)
+    return 0

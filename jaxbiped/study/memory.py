@@ -1,0 +1,57 @@
+"""What a study needs in memory at once, so that one that does not fit is refused before it is compiled."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+
+from jaxbiped.errors import InputError
+from jaxbiped.mission.queue import SLOTS
+from jaxbiped.mission.settings import Program
+
+# Bytes, measured as growth of the resident memory and rounded up (`sweeps/bench_sweep.py --memory`).
+POINT = 60_000  # a sweep point: its config
+SETTING = 4_000  # and its numbers, for each strategy
+ROW = 2_000  # a mission of a shard: its job, its result on both sides, its row
+MAPS = 4  # copies of a slot's map: the queue's, and what an update makes of it
+SHARE = 0.8  # of the memory that there is
+
+
+def memory() -> int:
+    """Bytes that this process can have: of the machine, or of its control group."""
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    with contextlib.suppress(OSError, ValueError):
+        total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return int(SHARE * total)
+
+
+def most_points(strategies: int) -> int:
+    """How many sweep points fit, on one arena at a time."""
+    return memory() // (POINT + strategies * (SETTING + ROW))
+
+
+def map_bytes(static: Program, workers: int) -> int:
+    """Bytes of the maps of all slots."""
+    height, width = static.spec.shape
+    layers = static.spec.levels + 4 + static.spec.ground_levels
+    return 4 * height * width * layers * SLOTS * workers * MAPS
+
+
+def check_memory(static: Program, points: int, strategies: int, arenas: int, workers: int) -> None:
+    """Raise `InputError` when a shard of `arenas` under `points` does not fit, with what would.
+
+    Args:
+      points: of one group, all in one call.
+      workers: queues at once, each with maps of its own.
+    """
+    maps = map_bytes(static, workers)
+    left = memory() - maps - points * (POINT + strategies * SETTING)
+    fit = left // (points * strategies * ROW)
+    if left <= 0 or fit < 1:
+        size = f"{points} points x {strategies} strategies with maps of {static.spec.shape} cells"
+        message = f"{size} need {(memory() - left) / 2**30:.1f} GiB, of {memory() / 2**30:.1f} that may be used"
+        raise InputError(f"{message}; sweep fewer points at once, or on a coarser pitch", field="axes")
+    if arenas > fit:
+        message = f"{points} points x {strategies} strategies: at most {fit} arenas a shard fit in memory"
+        raise InputError(message, field="shard", value=arenas)

@@ -1,0 +1,148 @@
+"""A sweep: a study over many points of its config."""
+
+from __future__ import annotations
+
+import difflib
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
+
+import pydantic
+import tyro
+
+from jaxbiped.arenas.families import SIZE_X, SIZE_Y
+from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.config import Model
+from jaxbiped.errors import InputError
+from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.study.axes import Axis, Sobol, told
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.groups import Point
+from jaxbiped.study.memory import most_points
+
+POPULATION = "population"
+EXAMPLES = "costs.c3, pitch, stereo.sd, robot.radius or population.bump_width"
+
+
+class SweepConfig(StudyConfig):
+    """A study over a grid of values, Sobol points, or both combined: the last axis changes fastest.
+
+    Any numeric field of the config can be swept. Which of them need a compilation of their own shows by itself: points
+    share one program unless array shapes differ.
+    """
+
+    axes: Annotated[tuple[Axis, ...], tyro.conf.Fixed] = ()
+    sobol: Annotated[Sobol | None, tyro.conf.Fixed] = None
+
+    @pydantic.model_validator(mode="after")
+    def _sound(self):
+        try:
+            for _ in self.points():
+                pass
+        except InputError as error:
+            told(str(error))
+        return self
+
+    def fields(self) -> tuple[str, ...]:
+        """All fields that are swept, in the order of the columns of `points.parquet`."""
+        return *itertools.chain(*(axis.names() for axis in self.axes)), *(self.sobol.names() if self.sobol else ())
+
+    def size(self) -> int:
+        """How many points there are."""
+        return math.prod(len(axis.numbers()) for axis in self.axes) * (self.sobol.points if self.sobol else 1)
+
+    def points(self) -> Iterator[Point]:
+        """The sweep points, each of them validated; one alone where nothing is swept.
+
+        Raises:
+          InputError: a field that is unknown, not a number, or swept twice; a value that its field does not allow,
+            alone or with the others of its point; more points than memory holds.
+        """
+        fields = self.fields()
+        if self.size() > (most := most_points(len(self.strategies))):
+            sizes = [*(len(axis.numbers()) for axis in self.axes), *([self.sobol.points] if self.sobol else [])]
+            message = f"{' x '.join(map(str, sizes))} points are more than memory holds; at most {most} fit"
+            raise InputError(message, field="axes")
+        mission, population = self.mission.model_dump(), self.population.model_dump()
+        for name in fields:
+            if fields.count(name) > 1:
+                raise InputError("is swept twice; a field can be in one axis", field=f"axis {name}")
+            check_field(name, mission | {POPULATION: population})
+            if name.startswith(f"{POPULATION}.bump") and "bump" not in self.families:
+                raise InputError("needs the family bump among the families", field=f"axis {name}")
+        for index, values in enumerate(self.combinations()):
+            yield point_at(index, values, mission, population)
+
+    def combinations(self) -> Iterator[dict[str, float]]:
+        """Field to value, for each point."""
+        parts: list[list[dict[str, float]]] = []
+        for axis in self.axes:
+            rows = zip(axis.numbers(), *axis.together.values(), strict=True)
+            parts.append([dict(zip(axis.names(), row, strict=True)) for row in rows])
+        if self.sobol:
+            parts.append(self.sobol.numbers())
+        for row in itertools.product(*parts):
+            yield {name: value for part in row for name, value in part.items()}
+
+
+def point_at(index: int, values: dict[str, float], mission: dict[str, Any], population: dict[str, Any]) -> Point:
+    """One sweep point: the config with some of its fields replaced; InputError about the one that is not allowed."""
+    for name, value in values.items():
+        if name.startswith(f"{POPULATION}."):
+            population = replaced(population, name.split(".")[1:], value)
+        else:
+            mission = replaced(mission, name.split("."), value)
+    kind = validated(MissionConfig, mission, values)
+    try:
+        program(kind, (SIZE_X, SIZE_Y))
+    except InputError as error:
+        raise InputError(f"{shown(values)}: {error}", field="axes") from None
+    return Point(index, kind, validated(PopulationConfig, population, values, f"{POPULATION}."), values)
+
+
+def validated(model: type[Model], data: dict[str, Any], values: Mapping[str, float], prefix: str = ""):
+    """The model of a point; InputError that names the swept field, or all of them where it is how they combine."""
+    try:
+        return model.model_validate(data)
+    except pydantic.ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        field, message = prefix + ".".join(map(str, first["loc"])), first["msg"].removeprefix("Value error, ")
+        if field in values:
+            raise InputError(message, field=f"axis {field}", value=values[field]) from None
+        raise InputError(f"{shown(values)}: {message}", field=f"axes, {field}") from None
+
+
+def shown(values: Mapping[str, float]) -> str:
+    """A point in words."""
+    return ", ".join(f"{name} = {value:g}" for name, value in values.items())
+
+
+def replaced(tree: dict[str, Any], path: list[str], value: float) -> dict[str, Any]:
+    """A config's values with one of them replaced."""
+    name, *rest = path
+    return tree | {name: replaced(tree[name], rest, value) if rest else value}
+
+
+def check_field(name: str, config: Mapping[str, Any]) -> None:
+    """Raise `InputError` unless a dotted name is that of a number of a config."""
+    leaves = dict(flat(config))
+    field = f"axis {name}"
+    if name not in leaves:
+        inside = [leaf for leaf in leaves if leaf.startswith(f"{name}.")]
+        near = inside or difflib.get_close_matches(name, leaves, 3, 0.6)
+        message = "is a table; sweep a number in it" if inside else "no such field; sweep a number of the config"
+        raise InputError(f"{message}, such as {', '.join(near[:4]) or EXAMPLES}", field=field)
+    number = isinstance(leaves[name], int | float) and not isinstance(leaves[name], bool)
+    if not (number or (leaves[name] is None and name.startswith(f"{POPULATION}."))):
+        raise InputError(f"is not a number; sweep one, such as {EXAMPLES}", field=field, value=leaves[name])
+
+
+def flat(tree: Mapping[str, Any], name: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted names and values of all that is no table."""
+    for key, value in tree.items():
+        dotted = f"{name}.{key}" if name else key
+        if isinstance(value, Mapping):
+            yield from flat(value, dotted)
+        else:
+            yield dotted, value
