@@ -24,6 +24,7 @@ class Cell:
     high_pad: str = ""
     width: int = 0  # characters that a limit of this column takes
     after: str = ""
+    gap: bool = False  # whether room is left for an interval, since others of the column have one
 
 
 @dataclass(frozen=True)
@@ -77,8 +78,16 @@ def aligned(cells: list[Cell]) -> list[Cell]:
         result.append(replace(cell, **pads))
     ends = [limit for cell in result for limit in (cell.low + cell.low_pad, cell.high + cell.high_pad)]
     width = max(map(len, ends), default=0)
+    beside = any(cell.value and cell.low for cell in result)
     return [
-        replace(cell, width=width, value=typeset(cell.value), low=typeset(cell.low), high=typeset(cell.high))
+        replace(
+            cell,
+            width=width,
+            value=typeset(cell.value),
+            low=typeset(cell.low),
+            high=typeset(cell.high),
+            gap=beside and not cell.low,
+        )
         for cell in result
     ]
 

@@ -44,7 +44,7 @@ class Section:
     text: tuple[str, ...] = ()
     plots: tuple[Plot, ...] = ()
     grids: tuple[Grid, ...] = ()
-    kind: str = ""  # "wide": figures below each other
+    kind: str = ""  # "wide": figures below each other; "pairs": two and two
 
 
 @dataclass(frozen=True)

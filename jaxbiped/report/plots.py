@@ -23,7 +23,7 @@ ON_COLOUR = "#FEFEFE"  # letters on a bar: white in the dark, too
 class Plot:
     """A figure as it lies in the page."""
 
-    svg: str
+    markup: str  # of an svg or img element
     caption: str
 
 

@@ -12,11 +12,13 @@ import polars as pl
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
 from jaxbiped.report.answer import answer
+from jaxbiped.report.examples import example_section
 from jaxbiped.report.figures import write_figures
 from jaxbiped.report.page import PAGE, page_of, render
 from jaxbiped.report.tables import markdown_sheets, to_markdown
 from jaxbiped.report.words import number
-from jaxbiped.study import QUESTION, Comparison, Manifest, compare, read, sample_size
+from jaxbiped.study import QUESTION, Comparison, Manifest, compare, read, read_points, sample_size
+from jaxbiped.study.again import Origin
 
 SUMMARY = "summary.md"
 QUESTION_TEXT = "When, and by how much, does bump-aware planning beat floor-only planning?"
@@ -44,7 +46,7 @@ class Report:
     files: tuple[Path, ...]  # written: page, summary and figures
 
 
-def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -> Report:
+def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, examples: int = 0) -> Report:
     """Read a results folder, compare its strategies, and write `report.html`, `summary.md` and figures into it.
 
     May be called again at any time: the same rows give the same report. Seeds the bootstraps with the study's seed.
@@ -52,6 +54,8 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -
     Args:
       point: the sweep point to report on.
       resamples: of the bootstraps.
+      examples: arenas where the two strategies of the question differ most, to be played again and drawn; this
+        compiles a mission.
 
     Raises:
       InputError: no results, damaged results, no rows, or files that cannot be written.
@@ -62,13 +66,21 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -
         raise InputError("has no rows to report on yet", file=folder)
     comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
     figures = write_figures(folder, frame, comparison)
+    frame = frame.filter(pl.col("point") == point)
+    more = ()
+    if examples and comparison.question:
+        values = open_values(folder, point)
+        origins = tuple(Origin(manifest, point, values, name) for name in comparison.question)
+        section = example_section(frame, comparison.question, origins, examples)
+        more = (section,) if section else ()
     page = page_of(
-        frame.filter(pl.col("point") == point),
+        frame,
         comparison,
         manifest,
         title=question(comparison) if comparison.question else "One strategy on random arenas",
         limitations=LIMITATIONS,
         commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
+        more=more,
         warnings=(() if manifest.state == "finished" else (unfinished(comparison, manifest),)),
     )
     texts = {PAGE: render(page), SUMMARY: summary(comparison, manifest, figures)}
@@ -76,6 +88,12 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999) -
         write_whole(folder / name, lambda file, text=text: file.write(text.encode()))
     files = tuple(folder / name for name in (*texts, *figures))
     return Report(folder, comparison, manifest, answer(comparison), files)
+
+
+def open_values(folder: Path, point: int) -> dict[str, float]:
+    """The swept fields at one sweep point of a folder, by their dotted names."""
+    row = read_points(folder).filter(pl.col("point") == point).row(0, named=True)
+    return {name: value for name, value in row.items() if name != "point"}
 
 
 def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str]) -> str:
