@@ -12,8 +12,10 @@ from jaxbiped.sensing.camera import CameraConfig, Mount
 from jaxbiped.sensing.landmarks import LandmarkNoise
 from jaxbiped.sensing.shot import Shot
 from jaxbiped.sensing.stereo.calibration import ideal
+from jaxbiped.sensing.stereo.landmarks import find
 from jaxbiped.sensing.stereo.matching import Disparity, MatchParams, match
 from jaxbiped.sensing.stereo.points import to_points
+from jaxbiped.sensing.stereo.recognise import floor_disparity, recognise
 from jaxbiped.sensing.stereo.renderer import Pair, Renderer
 from jaxbiped.sensing.view import Sightings, View
 
@@ -77,9 +79,13 @@ class StereoSensor:
     ) -> Shot:
         """What a pair of pictures shows."""
         disparity = match(pair.left, pair.right, self.params)
-        view = self.view(disparity, at, max_range)
-        none = np.zeros(np.shape(arena.landmarks.x), np.float32)
-        return Shot(view, Sightings(none, none, none, none > 0), pair.left, disparity.value)
+        floor = -float(believed.z)
+        marks, patches = find(pair.left, pair.right, self.rig, at, floor)
+        below = float(at.height) - floor
+        known = floor_disparity(patches, arena.landmarks, believed, self.rig, at, below)
+        disparity = Disparity(np.where(known > 0, known, disparity.value), disparity.valid | (known > 0))
+        sightings = recognise(marks, arena.landmarks, believed, spread)
+        return Shot(self.view(disparity, at, max_range), sightings, pair.left, disparity.value)
 
     def nothing(self, arena: Arena) -> Shot:
         """A measurement of nothing."""
