@@ -111,7 +111,7 @@ def say_floor(upright: Upright, cloud: Cloud) -> str:
     if upright.floor is None:
         return f"given: {upright.frame} is up"
     floor = upright.floor
-    height = floor.offset + float(floor.up @ cloud.origin)
+    height = upright.height + float(FRAMES[upright.frame][2] @ cloud.origin)
     return (
         f"found: {upright.frame} is up but for {math.degrees(upright.tilt):.2f} degrees, height {height:.3f} m; "
         f"{floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm"

@@ -9,7 +9,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Float, Float32, Int64
 
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
@@ -20,6 +20,7 @@ from jaxbiped.mapping.params import MapConfig
 from jaxbiped.sensing.view import View
 
 AT_ONCE = 1_000_000  # points that are put into voxels at a time: memory stays bounded
+MOST_WAITING = 16_000_000  # cubes that are remembered before those seen twice are struck out
 CUBE = 0.01  # [m] points of one cube this wide count once
 PIXELS = 8.0  # pixels that 1 cm2 of surface is worth, in the thresholds of `MapConfig`
 COVERED = 12.5  # [cm2] of 5 x 5 cm that a scan is taken to cover; sparser ones count for more
@@ -101,18 +102,28 @@ def cover_voxels(
     corner = np.array([*origin_xy, (spec.lowest - 0.5) * spec.level_height])
     unit = np.array([spec.pitch, spec.pitch, spec.level_height]) / sides
     cubes = np.array([columns, rows, depth]) * sides
-    keys = np.zeros(0, np.int64)
+    pending, waiting = [np.zeros(0, np.int64)], 0
     for some in chunks(len(points)):
         part = np.asarray(points[some], np.float64)
         with np.errstate(invalid="ignore"):
             index = np.floor((part - corner) / unit)
             inside = ((index >= 0) & (index < cubes)).all(1)
         x, y, z = index[inside].astype(np.int64).T
-        keys = np.union1d(keys, (y * cubes[0] + x) * cubes[2] + z)
+        pending.append(distinct((y * cubes[0] + x) * cubes[2] + z))
+        waiting += len(pending[-1])
+        if waiting > MOST_WAITING:
+            pending, waiting = [distinct(np.concatenate(pending))], 0
+    keys = distinct(np.concatenate(pending))
     z, x, y = keys % cubes[2], keys // cubes[2] % cubes[0], keys // cubes[2] // cubes[0]
     voxel = (y // sides[1] * columns + x // sides[0]) * depth + z // sides[2]
     count = np.bincount(voxel, minlength=rows * columns * depth)
     return (count * (unit[0] * unit[1] / CUBE**2)).astype(np.float32).reshape(rows, columns, depth)
+
+
+def distinct(keys: Int64[np.ndarray, "n"]) -> Int64[np.ndarray, "m"]:
+    """Sorted, each once. (By a sort: for integers, `np.unique` hashes, and takes ten times as long.)"""
+    keys = np.sort(keys)
+    return keys[np.concatenate([[True], keys[1:] != keys[:-1]])] if len(keys) else keys
 
 
 def make_chart(

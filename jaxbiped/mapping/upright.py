@@ -31,6 +31,7 @@ class Upright:
     shift: Float[np.ndarray, "3"]  # [m]
     floor: Floor | None  # as it was found, in the frame of the cloud; None where it was given
     frame: str  # the axis of the cloud's frame that points up, or nearly
+    height: float  # [m] of the floor along that axis, at the pivot
 
     def apply(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
         """Points [m] in the frame of the map, of the same type."""
@@ -62,7 +63,9 @@ def set_upright(
     R = turned @ renamed
     shift = renamed @ pivot - R @ pivot
     shift[2] = -offset
-    return Upright(R, shift, floor, frame)
+    x, y, z = renamed @ up
+    height = (offset - np.array([x, y]) @ (renamed @ pivot)[:2]) / z
+    return Upright(R, shift, floor, frame, float(height))
 
 
 def shortest(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

@@ -56,7 +56,7 @@ def make_rig(config: RectifiedConfig | RawConfig) -> Rig:
         return Rig(config.camera(), None, np.eye(3), config.num_disparities, config.pose)
     shape = config.width, config.height
     lenses = [(lens.matrix, np.array(lens.distortion or (0.0,) * 4)) for lens in (config.left, config.right)]
-    R, T = np.array(config.rotation), np.array(config.translation)
+    R, T = np.array(config.rotation), np.array(config.translation)[:, None]
     R_left, R_right, P_left, P_right, *_ = cv2.stereoRectify(
         *lenses[0], *lenses[1], shape, R, T, flags=cv2.CALIB_ZERO_DISPARITY, alpha=0
     )
