@@ -189,8 +189,8 @@ def missions(config: TuneConfig) -> str:
 def how(config: TuneConfig) -> str:
     """The method, for who reads the tables."""
     return (
-        f"`{START}`: the costs of the mission. `{TUNED}`: Adam over {config.steps} steps in the logarithms of C1 to C4 "
-        f"with C0 fixed, within {config.low:g} to {config.high:g} C0, on gradients from {config.pairs} pairs of "
-        f"perturbed costs a step; the mean over the second half. `{SWEPT}`: the point with the least objective over "
+        f"`{START}`: the costs of the mission. `{TUNED}`: sign descent over {config.steps} steps in the logarithms of "
+        f"C1 to C4 with C0 fixed, within {config.low:g} to {config.high:g} C0, on gradients from {config.pairs} pairs "
+        f"of perturbed costs a step; the mean over the second half. `{SWEPT}`: the point with the least objective over "
         f"all training arenas. `{DURATIONS}`: least squares of the times of the moves, measurements included."
     )

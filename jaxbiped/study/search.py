@@ -1,10 +1,11 @@
 """Searching for costs: the gradient of an objective that is only known by trying, and points spread over a box.
 
 An objective of missions is a function of the paths taken, and these are the same for costs that differ by little: it is
-piecewise constant in the costs, and has no gradient to follow. What has one is its mean over perturbed costs,
-J_s(t) = E[J(t + s e)], e ~ N(0, 1): grad J_s(t) = E[J(t + s e) e] / s, the score function estimator (evolution
-strategies). Perturbations come in pairs +e and -e, which takes out J(t) itself, along directions square to each other,
-which spreads them; all are tried on the same arenas with the same noise.
+piecewise constant in the costs, and has no gradient to follow. What has one is its mean over a ball of perturbed costs,
+J_r(t) = E[J(t + r v)], v uniform in the unit ball of d dimensions: grad J_r(t) = d/r E[J(t + r u) u], u uniform on the
+sphere (Flaxman, Kalai and McMahan, 2005, Online convex optimization in the bandit setting). Directions are square to
+each other and come in pairs +u and -u: d pairs are central differences with a wide step along a frame that is turned
+at random, and exact where J is linear. All are tried on the same arenas with the same noise.
 """
 
 from __future__ import annotations
@@ -15,23 +16,22 @@ from scipy.stats import qmc
 
 
 def directions(rng: np.random.Generator, pairs: int, dimensions: int) -> Float[np.ndarray, "pairs dimensions"]:
-    """Standard normal vectors, square to each other in groups of `dimensions`. Consumes `rng`."""
+    """Unit vectors, each uniform on the sphere, square to each other in groups of `dimensions`. Consumes `rng`."""
     groups = -(-pairs // dimensions)
     square, _ = np.linalg.qr(rng.normal(size=(groups, dimensions, dimensions)))
-    # QR fixes signs; lengths of normal vectors are drawn apart from their directions
-    signs = rng.choice([-1.0, 1.0], size=(groups, dimensions, 1))
-    lengths = np.sqrt(rng.chisquare(dimensions, size=(groups, dimensions, 1)))
-    return (np.swapaxes(square, 1, 2) * signs * lengths).reshape(-1, dimensions)[:pairs]
+    signs = rng.choice([-1.0, 1.0], size=(groups, dimensions, 1))  # QR prefers some
+    return (np.swapaxes(square, 1, 2) * signs).reshape(-1, dimensions)[:pairs]
 
 
 def gradient(
     plus: Float[np.ndarray, "pairs"],
     minus: Float[np.ndarray, "pairs"],
     along: Float[np.ndarray, "pairs dimensions"],
-    spread: float,
+    radius: float,
 ) -> Float[np.ndarray, "dimensions"]:
-    """The estimate of grad J_s from the objective at +e and -e; without bias if `along` is standard normal."""
-    return ((plus - minus)[:, None] * along).mean(0) / (2 * spread)
+    """The estimate of grad J_r, without bias, from the objective at t + r u (`plus`) and at t - r u (`minus`)."""
+    pairs, dimensions = along.shape
+    return dimensions / pairs * ((plus - minus) / (2 * radius)) @ along
 
 
 def sobol(count: int, low: float, high: float, dimensions: int, seed: int) -> Float[np.ndarray, "count dimensions"]:

@@ -53,14 +53,14 @@ class TuneConfig(Model):
     """Whose missions; the way of `blind_stop` does not depend on costs."""
     steps: Positive = 32
     """Steps of the descent."""
-    batch: Positive = 64
+    batch: Positive = 32
     """Training arenas of a step; steps take them in turn."""
     pairs: Annotated[int, pydantic.Field(ge=1, le=1024)] = 4
     """Pairs of perturbed costs of a step, all on the same arenas with the same noise."""
-    spread: Annotated[float, pydantic.Field(gt=0.0, le=3.0)] = 1.0
-    """Standard deviation of the perturbed logarithms."""
+    radius: Annotated[float, pydantic.Field(gt=0.0, le=3.0)] = 1.0
+    """By how much the logarithms are perturbed, together."""
     rate: Annotated[float, pydantic.Field(gt=0.0, le=3.0)] = 0.15
-    """Learning rate of Adam at the first step; it falls to 0 as a cosine."""
+    """What each logarithm changes in the first step; it falls to 0 as a cosine."""
     penalty: Annotated[float, pydantic.Field(gt=0.0, le=1e6)] = 1800.0
     """[s] that a failed mission counts, and a longer one too."""
     low: Annotated[float, pydantic.Field(ge=1e-3, le=1e3)] = 0.1
@@ -125,11 +125,15 @@ def tune(
 ) -> Tuning:
     """Tune costs, sweep them for comparison, and judge both, and those that durations stand for, on test arenas.
 
-    Adam (optax) follows the gradient of the perturbed objective (`search`) in the logarithms of C1 to C4 over C0,
-    inside the box [low, high]; what it gives is the mean of the logarithms over the second half of its steps, since a
-    noisy descent wanders about the place that it has found. Costs are perturbed, and not the planner smoothed: a
-    softmin over the paths of a known map knows nothing of C4, which acts through what is measured on the way, nor of
-    failures, and a mission's time is no function of its path's cost.
+    The descent follows the signs of the gradient of the perturbed objective (`search`; sign descent of optax) in the
+    logarithms of C1 to C4 over C0, inside the box [low, high]. Signs, because now and then one perturbed mission falls:
+    a thousand seconds in one arena, where the slopes to be found are a few. Adam, which remembers squares, is thrown
+    off by a single one for all of its steps. What is given is the mean of the logarithms over the second half of the
+    steps, since a noisy descent wanders about the place that it has found.
+
+    Costs are perturbed, and not the planner smoothed: a softmin over the paths of a known map knows nothing of C4,
+    which acts through what is measured on the way, nor of failures, and a mission's time is no function of its path's
+    cost.
 
     The best point of the sweep is the one with the least objective over all training arenas.
 
@@ -192,20 +196,20 @@ def descend(
     box = np.log([config.low, config.high])
     c0, tiny = start[0], np.exp(box[0])
     place = np.clip(np.log(np.maximum(start[1:] / c0, tiny)), *box)
-    adam = optax.adam(optax.cosine_decay_schedule(config.rate, config.steps))
-    state, rows, places = adam.init(place), [], []
+    descent = optax.sign_sgd(optax.cosine_decay_schedule(config.rate, config.steps))
+    state, rows, places = descent.init(place), [], []
     for step in range(config.steps):
         index = (step * config.batch + np.arange(config.batch)) % len(train)
         along = directions(np.random.default_rng((config.seed, step)), config.pairs, len(place))
-        tried = place + config.spread * np.concatenate([along, -along])
+        tried = place + config.radius * np.concatenate([along, -along])
         result = run(c0 * np.exp(np.column_stack([np.zeros(len(tried)), np.clip(tried, *box)])), train[index])
         seconds = objective(result, config.penalty).mean(1)
-        slope = gradient(*np.split(seconds, 2), along, config.spread)
+        slope = gradient(*np.split(seconds, 2), along, config.radius)
         values = dict(zip(NAMES, c0 * np.exp([0.0, *place]), strict=True))
         spent = {"objective": seconds.mean(), "start": began[index].mean()}
         slopes = {f"slope_{name}": value for name, value in zip(NAMES[1:], slope, strict=True)}
         rows.append({"step": step, **values, **spent, **slopes})
-        change, state = adam.update(slope, state)
+        change, state = descent.update(slope, state)
         place = np.clip(place + np.asarray(change, float), *box)
         places.append(place)
     found = np.mean(places[config.steps // 2 :], axis=0)

@@ -11,40 +11,44 @@ from tests.planning import oracle
 FOUR_SIGMA = 4.0  # standard errors: a test that fails by chance once in 16,000
 
 
-def test_directions_are_square_to_each_other_and_standard_normal():
+def test_directions_are_square_to_each_other_and_uniform():
     rng = np.random.default_rng(0)
     drawn = np.array([directions(rng, 6, 4) for _ in range(4000)])
     assert drawn.shape == (4000, 6, 4)
     products = drawn @ np.swapaxes(drawn, 1, 2)
-    off = products[:, [0, 0, 1, 4], [1, 3, 2, 5]]  # within the first four, and within the last two
-    np.testing.assert_allclose(off, 0, atol=1e-12)
-    for k in range(4):
-        assert stats.kstest(drawn[:, 0, k], "norm").pvalue > 1e-3
-        assert stats.kstest(drawn[:, 5, k], "norm").pvalue > 1e-3
-    np.testing.assert_array_equal(
-        directions(np.random.default_rng(3), 4, 4), directions(np.random.default_rng(3), 4, 4)
-    )
+    np.testing.assert_allclose(products[:, :4, :4], np.broadcast_to(np.eye(4), (4000, 4, 4)), atol=1e-12)
+    np.testing.assert_allclose(products[:, 4:, 4:], np.broadcast_to(np.eye(2), (4000, 2, 2)), atol=1e-12)
+    for row in (0, 5):
+        for k in range(4):  # (x + 1) / 2 of a point on the sphere of four dimensions
+            assert stats.kstest((drawn[:, row, k] + 1) / 2, stats.beta(1.5, 1.5).cdf).pvalue > 1e-3
+    np.testing.assert_array_equal(*(directions(np.random.default_rng(3), 4, 4) for _ in range(2)))
 
 
-def test_gradient_of_a_step_in_closed_form():
-    """E[x + s e > c] is the normal distribution function, though the step itself has no gradient anywhere."""
-    rng, spread, place = np.random.default_rng(1), 0.7, np.array([0.2, -0.4])
-    edge = np.array([0.5, 0.1])
+def test_exact_where_the_objective_is_linear():
+    rng, slope = np.random.default_rng(4), np.array([3.0, -1.0, 0.0, 20.0])
+    for pairs in (4, 8):
+        along = directions(rng, pairs, 4)
+        np.testing.assert_allclose(gradient(7 + along @ slope, 7 - along @ slope, along, 1.0), slope, atol=1e-12)
+
+
+def test_gradient_of_a_jump_in_closed_form():
+    """Its mean over a disc is the share of the disc beyond it, though the jump itself has no gradient anywhere."""
+    rng, radius, place, edge = np.random.default_rng(1), 0.7, np.array([0.2, -0.4]), np.array([0.5, 0.1])
 
     def objective(x):
         return np.sum(x > edge, axis=-1).astype(float)
 
     along = [directions(rng, 2, 2) for _ in range(20000)]
-    found = np.array([gradient(objective(place + spread * e), objective(place - spread * e), e, spread) for e in along])
-    wanted = stats.norm.pdf((place - edge) / spread) / spread
+    found = np.array([gradient(objective(place + radius * u), objective(place - radius * u), u, radius) for u in along])
+    wanted = 2 / (np.pi * radius) * np.sqrt(1 - ((place - edge) / radius) ** 2)  # the chord over the disc's area
     error = found.std(0) / np.sqrt(len(found))
     assert np.all(np.abs(found.mean(0) - wanted) < FOUR_SIGMA * error) and np.all(error < 0.02 * wanted)
 
 
 @pytest.mark.parametrize("pairs", [1, 4])
 def test_gradient_of_planned_times_is_that_of_finite_differences(pairs):
-    """The time of planned paths, a function of the path: flat, with jumps. Its perturbed mean is smooth."""
-    rng, spread, count, maps = np.random.default_rng(2), 0.8, 256, 16
+    """The time of planned paths, a function of the path: flat, with jumps. Its mean over a ball is smooth."""
+    rng, radius, count, maps = np.random.default_rng(2), 1.5, 256, 16
     classes, levels = oracle.random_grids(rng, maps, 7, 8, blocked=0.1)
     levels = np.minimum(levels, 1)
     ends = np.tile([[0, 0]], (maps, 1)), np.tile([[6, 7]], (maps, 1))
@@ -64,15 +68,17 @@ def test_gradient_of_planned_times_is_that_of_finite_differences(pairs):
         return np.asarray(seconds, float).reshape(count, maps).mean(1)
 
     along = np.concatenate([directions(rng, pairs, 4) for _ in range(count // pairs)])
-    plus, minus = objective(place + spread * along), objective(place - spread * along)
+    plus, minus = objective(place + radius * along), objective(place - radius * along)
     found = np.array(
-        [gradient(*(part[k : k + pairs] for part in (plus, minus, along)), spread) for k in range(0, count, pairs)]
+        [gradient(*(part[k : k + pairs] for part in (plus, minus, along)), radius) for k in range(0, count, pairs)]
     )
-    # wide differences of the perturbed mean, on the same perturbations: their bias is of third order
-    step, noise = 0.4, stats.norm.ppf(sobol(count, 0.0, 1.0, 4, 7).clip(1e-6, 1 - 1e-6))
+    # wide differences of the mean over the ball, on the same points of it: their bias is of third order
+    step, inside = 0.4, sobol(count, 0.0, 1.0, 5, 7).clip(1e-6, 1 - 1e-6)
+    ball = stats.norm.ppf(inside[:, :4])
+    ball *= inside[:, 4:] ** 0.25 / np.linalg.norm(ball, axis=1, keepdims=True)
     error = found.std(0) / np.sqrt(len(found))
     for k, axis in enumerate(np.eye(4)):
-        sides = [objective(place + sign * step * axis + spread * noise) for sign in (1, -1)]
+        sides = [objective(place + sign * step * axis + radius * ball) for sign in (1, -1)]
         difference = (sides[0] - sides[1]) / (2 * step)
         both = np.hypot(error[k], difference.std() / np.sqrt(count))
         assert abs(found.mean(0)[k] - difference.mean()) < FOUR_SIGMA * both, k

@@ -85,7 +85,7 @@ def test_where_costs_do_nothing_nothing_changes():
 def test_a_loss_is_reported_as_one():
     """One wild step away from what is best already."""
     best = MissionConfig(costs=dict(zip(("c1", "c2", "c3", "c4"), BEST.tolist(), strict=True)))
-    options = SMALL | {"steps": 1, "rate": 3.0, "sweep": 0}
+    options = SMALL | {"steps": 1, "rate": 2.0, "sweep": 0}
     tuning = tune(TuneConfig(**options, mission=best), Made())
     assert {gap.first for gap in tuning.gaps} == {"tuned", "durations"} and "sweep" not in tuning.costs
     assert tuning.gaps[0].objective.low > 0 and len(tuning.swept) == 0
