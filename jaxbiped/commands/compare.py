@@ -3,30 +3,45 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated, Literal
 
+import pydantic
 from rich.console import Console
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
+from jaxbiped.errors import InputError
 from jaxbiped.files import refuse_existing
 from jaxbiped.mission.settings import SIMULATED, program
 from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import terminal
-from jaxbiped.study.conduct import conduct
-from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.comparison import default_pairs
+from jaxbiped.study.conduct import conduct, never
+from jaxbiped.study.config import StrategyName, StudyConfig
+from jaxbiped.study.sequential import MEASURES, Goal
+from jaxbiped.study.stopping import Rule
 
 
 class CompareArgs(StudyConfig):
     """Compare strategies on random arenas: missions, paired statistics, tables and figures.
 
-    A study in TOML may come first; options on the command line override it.
+    A study in TOML may come first; options on the command line override it. A results folder in its place, or two,
+    are compared without running again: see `jaxbiped compare FOLDER --help`.
     """
 
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/compare-<hash of the study>."""
     resume: bool = False
     """Go on with the same study in the folder, where it was stopped; or begin it."""
+    until_width: Annotated[float, pydantic.Field(gt=0.0)] | None = None
+    """[fraction, m or s] Stop after the shard that brings the interval of a difference to this width; it holds at every
+    look. `--arenas` is then the most, `--shard` how many between looks."""
+    measure: Literal[MEASURES] = "success"
+    """Whose difference `--until-width` is about."""
+    first: StrategyName | None = None
+    """Of that difference: first minus second; by default the pair that the report is about."""
+    second: StrategyName | None = None
 
 
 def main(args: CompareArgs) -> int:
@@ -38,7 +53,8 @@ def main(args: CompareArgs) -> int:
     Raises:
       InputError: a config that cannot be run, a folder that exists or cannot be written, a full disk.
     """
-    config = StudyConfig.model_validate(args.model_dump(exclude={"out", "resume"}))
+    config = StudyConfig.model_validate(args.model_dump(include=set(StudyConfig.model_fields)))
+    goal = goal_of(args, config)
     program(config.mission, (SIZE_X, SIZE_Y))  # refuses what does not fit before anything is written
     if config.mission.executor in SIMULATED:
         from jaxbiped.mission.walking import rehearse  # loads MuJoCo
@@ -52,10 +68,38 @@ def main(args: CompareArgs) -> int:
     console.print(
         f"{config.arenas} arenas, seed {config.seed}, sensor {config.mission.sensor}: {names}", highlight=False
     )
+    enough = Rule(goal, out, config.arenas) if goal else never
     with progress(console) as show:
-        manifest = conduct(out, config, resume=args.resume, on_progress=show)
+        manifest = conduct(out, config, resume=args.resume, on_progress=show, enough=enough)
     report = write_report(out)
     console.print(terminal(report.comparison))
+    for sentence in report.remarks:
+        console.print(sentence, highlight=False)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
     console.print(f"{manifest.rows} missions in {spent}; written {out}", highlight=False)
     return 0
+
+
+def goal_of(args: CompareArgs, config: StudyConfig) -> Goal | None:
+    """What is watched; InputError where the difference is none of this study's."""
+    chosen = {"first": args.first, "second": args.second}
+    if args.until_width is None:
+        for name in chosen:
+            if chosen[name]:
+                raise InputError("goes with --until-width, or with a results folder", field=name, value=chosen[name])
+        return None
+    usual = next(iter(default_pairs(config.strategies)), None)
+    for name, other in (("first", "second"), ("second", "first")):
+        strategy = chosen[name]
+        if (strategy and strategy not in config.strategies) or usual is None:
+            message = f"must be one of the strategies, which are {', '.join(config.strategies)}, and needs another"
+            raise InputError(message, field=name, value=strategy)
+        if strategy and strategy == chosen[other]:
+            raise InputError("must differ from the other side", field=name, value=strategy)
+    rest = [name for name in (*usual, *config.strategies) if name not in chosen.values()]
+    first, second = (chosen[name] or rest.pop(0) for name in ("first", "second"))
+    if args.measure == "success" and args.until_width >= 2:
+        raise InputError(
+            "must be below 2 for success: wider no interval is", field="until-width", value=args.until_width
+        )
+    return Goal(args.measure, first, second, args.until_width)

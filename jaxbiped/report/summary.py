@@ -15,6 +15,7 @@ from jaxbiped.report.answer import answer
 from jaxbiped.report.examples import example_section
 from jaxbiped.report.figures import write_figures
 from jaxbiped.report.page import PAGE, page_of, render
+from jaxbiped.report.stopping import stopping_sentences
 from jaxbiped.report.tables import markdown_sheets, to_markdown
 from jaxbiped.report.words import number
 from jaxbiped.study import QUESTION, Comparison, Manifest, compare, read, read_points, sample_size
@@ -44,6 +45,7 @@ class Report:
     manifest: Manifest
     answer: tuple[str, ...]  # sentences, most important first
     files: tuple[Path, ...]  # written: page, summary and figures
+    remarks: tuple[str, ...] = ()  # what to know before anything else
 
 
 def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, examples: int = 0) -> Report:
@@ -67,6 +69,8 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, e
     comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
     figures = write_figures(folder, frame, comparison)
     frame = frame.filter(pl.col("point") == point)
+    remarks = () if manifest.state == "finished" else (unfinished(comparison, manifest),)
+    remarks += stopping_sentences(folder)
     more = ()
     if examples and comparison.question:
         values = open_values(folder, point)
@@ -81,13 +85,13 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, e
         limitations=LIMITATIONS,
         commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
         more=more,
-        warnings=(() if manifest.state == "finished" else (unfinished(comparison, manifest),)),
+        warnings=remarks,
     )
-    texts = {PAGE: render(page), SUMMARY: summary(comparison, manifest, figures)}
+    texts = {PAGE: render(page), SUMMARY: summary(comparison, manifest, figures, remarks)}
     for name, text in texts.items():
         write_whole(folder / name, lambda file, text=text: file.write(text.encode()))
     files = tuple(folder / name for name in (*texts, *figures))
-    return Report(folder, comparison, manifest, answer(comparison), files)
+    return Report(folder, comparison, manifest, answer(comparison), files, remarks)
 
 
 def open_values(folder: Path, point: int) -> dict[str, float]:
@@ -96,15 +100,16 @@ def open_values(folder: Path, point: int) -> dict[str, float]:
     return {name: value for name, value in row.items() if name != "point"}
 
 
-def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str]) -> str:
+def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str], remarks: tuple[str, ...] = ()) -> str:
     """The text of `summary.md`.
 
     Args:
       figures: file names beside the summary, with captions.
+      remarks: what to know before anything else.
     """
     lines = ["# Strategies compared", ""]
-    if manifest.state != "finished":
-        lines += [f"**{unfinished(comparison, manifest)}**", ""]
+    for remark in remarks:
+        lines += [f"**{remark}**", ""]
     sentences = answer(comparison)
     if sentences:
         lines += [

@@ -18,6 +18,11 @@ from jaxbiped.study.resume import resume as take_up
 Engine = Callable[..., Iterator[tuple[Shard, pl.DataFrame]]]
 
 
+def never(frame: pl.DataFrame) -> bool:
+    """All arenas are wanted."""
+    return False
+
+
 def conduct(
     folder: str | Path,
     config: StudyConfig,
@@ -26,12 +31,14 @@ def conduct(
     resume: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
     engine: Engine = evaluate,
+    enough: Callable[[pl.DataFrame], bool] = never,
 ) -> store.Manifest:
     """Compute a study and store it, shard by shard. A process that dies loses at most the shard that it was at.
 
     Args:
       folder: must not exist or be empty; with `resume`, one where the same study was stopped, or none yet.
       points: sweep points; by default the one of `config`.
+      enough: is given each shard once, those that were stored before first, and says whether the study can end there.
 
     Raises:
       InputError: a folder that is not so, or a full disk; what was stored stays readable.
@@ -45,8 +52,12 @@ def conduct(
     else:
         results = store.create(folder, config, **kind)
     with results:
-        for shard, frame in engine(config, on_progress, points=points, done=results.done()):
-            results.append(frame, shard.number, compile_time=clock.seconds)
+        stored = (pl.read_parquet(path) for path in store.shard_paths(results.folder))
+        if not any(enough(frame) for frame in stored):
+            for shard, frame in engine(config, on_progress, points=points, done=results.done()):
+                results.append(frame, shard.number, compile_time=clock.seconds)
+                if enough(frame):
+                    break
         return results.finish(compile_time=clock.seconds)
 
 

@@ -64,7 +64,9 @@ def test_all_looks_hold_at_once_where_naive_ones_do_not(kind):
 
 def test_the_intensity_is_the_best_for_its_moment():
     n, alpha = 700, 0.05
-    best = optimize.minimize_scalar(lambda x: radius(2.0, n, float(np.exp(x)), alpha), bounds=(-20, 5), method="bounded")
+    best = optimize.minimize_scalar(
+        lambda x: radius(2.0, n, float(np.exp(x)), alpha), bounds=(-20, 5), method="bounded"
+    )
     assert np.log(tightest_at(n, alpha)) == pytest.approx(best.x, abs=1e-3)
     u = least(alpha)
     assert u - np.log(u) == pytest.approx(1 - 2 * np.log(alpha))
