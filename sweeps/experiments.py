@@ -1,6 +1,6 @@
 """The six experiments of the paper, ours beside the paper's figures where it gives any (Tables 3 and 4).
 
-    python sweeps/experiments.py [--seeds N] [--executor kinematic|sampled|native|mjx]
+    python sweeps/experiments.py [--seeds N] [--executor kinematic|sampled|native|mjx] [--sensor raycast|stereo]
 
 Each scene is run with several noise seeds; printed are how the missions ended, and the median distance and time of
 those that reached the goal.
@@ -20,11 +20,12 @@ from rich.console import Console
 from rich.table import Table
 
 from jaxbiped.arenas import load_scene
+from jaxbiped.mission.eyes import eyes_for
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.evaluate import run_all
+from jaxbiped.study.evaluate import run_all, run_one_by_one
 from jaxbiped.study.walks import walk_all
 
 SCENES = Path(__file__).parent.parent / "configs" / "scenes"
@@ -57,18 +58,29 @@ def play(item: Experiment, config: MissionConfig, seeds: int):
     batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (seeds, *jnp.shape(leaf))), arena)
     noise = jnp.stack([from_key(jax.random.key(seed)) for seed in range(seeds)])
     points = stack([config.settings(item.strategy)])
+    arguments = batch, noise, points, seeds, static, lambda _: None
+    one = np.zeros(1, int)
+    eyes = eyes_for(config)
     if config.executor in SIMULATED:
-        result = walk_all(batch, noise, points, seeds, static, lambda _: None, config.walk)
+        result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
+    elif eyes:
+        result = run_one_by_one(*arguments, eyes, population_of=one)
     else:
-        result = run_all(batch, noise, points, seeds, static, lambda _: None, workers=1, slots=seeds)
+        result = run_all(*arguments, workers=1, slots=seeds)
+    if eyes:
+        eyes.close()
     return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
 
 
-def main(seeds: int = 8, executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic") -> None:
+def main(
+    seeds: int = 8,
+    executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic",
+    sensor: Literal["raycast", "stereo"] = "raycast",
+) -> None:
     """Run all six with `seeds` noise seeds each."""
     columns = "experiment", "strategy", "ended", "distance", "paper", "time", "paper"
-    table = Table(*columns, title=f"Medians over {seeds} seeds, executor {executor}")
-    config = MissionConfig(executor=executor)
+    table = Table(*columns, title=f"Medians over {seeds} seeds, executor {executor}, sensor {sensor}")
+    config = MissionConfig(executor=executor, sensor=sensor)
     for item in EXPERIMENTS:
         result = play(item, config, seeds)
         kinds, counts = np.unique(result.code, return_counts=True)

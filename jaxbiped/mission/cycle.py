@@ -91,10 +91,12 @@ def sense(
         view = oracle.measure(
             arena, world.pose, area, spacing=min(ORACLE_SPACING, program.spec.pitch), weight=ORACLE_WEIGHT
         )
-    else:
+    elif program.sensor == "raycast":
         view = raycast.measure(
             arena, pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat, attitude
         )
+    else:
+        raise ValueError(f"the sensor {program.sensor} measures on the host: its missions are given what they see")
     return view, landmarks.sight(
         arena, pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
     )

@@ -12,7 +12,7 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.settings import MissionConfig, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
-from jaxbiped.sensing.camera import Mount, mount, placed
+from jaxbiped.sensing.camera import CameraConfig, Mount, mount, placed
 from jaxbiped.sensing.hashing import fold
 from jaxbiped.sensing.noise import attitude_error
 from jaxbiped.sensing.shot import Shot
@@ -50,14 +50,14 @@ class Eyes(Protocol):
 class StereoEyes:
     """The sensor `stereo` for the robots of one process; to be used, and closed, in the thread that made it."""
 
-    def __init__(self, config: MissionConfig):
+    def __init__(self, camera: CameraConfig):
         """
         Raises:
           InputError: nothing can be rendered on this machine.
         """
         from jaxbiped.sensing.stereo.measure import StereoSensor  # loads MuJoCo, and how it renders
 
-        self.sensor = StereoSensor(config.camera)
+        self.sensor = StereoSensor(camera)
         self.last: Shot | None = None
 
     def see(
@@ -92,7 +92,7 @@ class StereoEyes:
 
 def eyes_for(config: MissionConfig) -> StereoEyes | None:
     """What a mission of this config sees with on the host; None where its sensor is JAX."""
-    return StereoEyes(config) if config.sensor in RENDERED else None
+    return StereoEyes(config.camera) if config.sensor in RENDERED else None
 
 
 @jax.jit

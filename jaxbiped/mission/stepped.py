@@ -71,16 +71,29 @@ def run_logged(
     Args:
       eyes: what it sees with, where the program's sensor is no JAX.
     """
-    batch = jax.tree.map(lambda leaf: leaf[None], (arena, settings))
-    world, mind = jax.tree.map(lambda leaf: leaf[None], start(arena, settings, seed, program.spec))
     recorder = Recorder(settings, program, on_decision, eyes)
+    return recorder.mission(arena, run_bare(arena, settings, seed, program, eyes, recorder))
+
+
+def run_bare(
+    arena: Arena,
+    settings: Settings,
+    seed: UInt32[Array, ""],
+    program: Program,
+    eyes: Eyes | None = None,
+    recorder: Recorder | None = None,
+) -> World:
+    """The end of one mission (no batch axis); its world has a leading axis of 1."""
+    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (arena, settings))
+    world, mind = jax.tree.map(lambda leaf: leaf[None], start(arena, settings, seed, program.spec))
     while world.code[0] == Code.RUNNING:
         before = world
         seen = eyes.see(world, mind, *batch) if eyes else None
         world, mind, _, command, thought = turn_once(world, mind, *batch, program, seen)
-        recorder.decided(0, before, command, thought)
-        recorder.concluded(0, world, mind)
-    return recorder.mission(arena, world)
+        if recorder:
+            recorder.decided(0, before, command, thought)
+            recorder.concluded(0, world, mind)
+    return world
 
 
 class Recorder:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -17,10 +18,12 @@ from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 from jaxbiped import arenas as arena_room
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
+from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, compile_queue
 from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards
@@ -78,13 +81,17 @@ def compute(config: StudyConfig, group: Group, shard: Shard, on_progress: OnProg
     index = shard.first + jnp.arange(size)
     batch, seeds = draw(jax.random.key(config.seed), index, config.families, group.populations)
     play = run_all
-    if group.walk is not None:
-        from jaxbiped.study.walks import walk_all  # loads MuJoCo
+    with contextlib.ExitStack() as stack:
+        eyes = stack.enter_context(contextlib.closing(StereoEyes(group.camera))) if group.camera else None
+        if group.walk is not None:
+            from jaxbiped.study.walks import walk_all  # loads MuJoCo
 
-        play = partial(walk_all, config=group.walk)
-    result = play(
-        batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
-    )
+            play = partial(walk_all, config=group.walk, eyes=eyes)
+        elif eyes:
+            play = partial(run_one_by_one, eyes=eyes)
+        result = play(
+            batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
+        )
     batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
     plan = plan_all(batch, group, size)
     return frame(np.arange(shard.first, shard.first + shard.count), batch, group, config.strategies, result, plan)
@@ -170,6 +177,36 @@ def run_all(
         mine = np.arange(worker, count * kinds, workers)
         for all_rows, rows in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):
             all_rows[point[mine], arena[mine]] = rows[: len(mine)]
+    return out
+
+
+def run_one_by_one(
+    batch: Arena,
+    seeds: UInt32[Array, "A"],
+    points: Settings,
+    count: int,
+    static: Program,
+    on_progress: OnProgress,
+    eyes: Eyes,
+    population_of: Int[np.ndarray, "P"],
+) -> Result:
+    """As `run_all`, one mission after the other, for a sensor that measures on the host."""
+    size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
+    shape = kinds, count
+    out = Result(*(np.zeros(shape, kind) for kind in (int, float, float, int, int, float)))
+    done = Tally(0, 0)
+    for arena_number, point in np.ndindex(count, kinds):
+        arena, settings = (
+            jax.tree.map(lambda leaf, row=row: leaf[row], tree)
+            for tree, row in ((batch, size * population_of[point] + arena_number), (points, point))
+        )
+        world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, eyes))
+        away = np.hypot(arena.goal_xy[0] - world.pose.x, arena.goal_xy[1] - world.pose.y)
+        values = world.code, world.distance, world.time, world.measurements, world.decisions, away
+        for column, value in zip(jax.tree.leaves(out), values, strict=True):
+            column[point, arena_number] = value[0]
+        done = done + Tally(1, int(world.code[0] == Code.REACHED))
+        on_progress(done)
     return out
 
 

@@ -11,10 +11,12 @@ from jaxtyping import Int
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.population import Population, PopulationConfig
+from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program
 from jaxbiped.mission.strategies import strategy
+from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.study.config import StudyConfig
 
 
@@ -34,6 +36,7 @@ class Group:
 
     static: Program
     walk: WalkConfig | None  # of simulated bipeds
+    camera: CameraConfig | None  # of sensors that measure on the host
     points: tuple[int, ...]  # indices of the points, rising
     settings: Settings  # [P * S], strategy by strategy within a point
     populations: Population | None  # [U], those that differ; None: nothing is fixed in any
@@ -64,12 +67,19 @@ def group_points(points: Iterable[Point], strategies: Sequence[str]) -> tuple[Gr
     together: dict[tuple, list[Point]] = {}
     for point in points:
         simulated = point.mission.executor in SIMULATED
-        key = program(point.mission, (SIZE_X, SIZE_Y)), point.mission.walk if simulated else None
-        together.setdefault(key, []).append(point)
-    return tuple(group(static, walk, members, strategies) for (static, walk), members in together.items())
+        walk = point.mission.walk if simulated else None
+        camera = point.mission.camera if point.mission.sensor in RENDERED else None
+        together.setdefault((program(point.mission, (SIZE_X, SIZE_Y)), walk, camera), []).append(point)
+    return tuple(group(*key, members, strategies) for key, members in together.items())
 
 
-def group(static: Program, walk: WalkConfig | None, points: Sequence[Point], strategies: Sequence[str]) -> Group:
+def group(
+    static: Program,
+    walk: WalkConfig | None,
+    camera: CameraConfig | None,
+    points: Sequence[Point],
+    strategies: Sequence[str],
+) -> Group:
     """The points of one program."""
     settings = []
     for point in points:
@@ -81,6 +91,7 @@ def group(static: Program, walk: WalkConfig | None, points: Sequence[Point], str
     return Group(
         static=static,
         walk=walk,
+        camera=camera,
         points=tuple(point.index for point in points),
         settings=stack(settings),
         populations=None if drawn else stack([population.traced() for population in different]),

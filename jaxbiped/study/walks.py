@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.queue import Jobs, OnProgress, Result
 from jaxbiped.mission.settings import Program, Settings
@@ -23,11 +24,12 @@ def walk_all(
     on_progress: OnProgress,
     config: WalkConfig,
     population_of: Int[np.ndarray, "P"],
+    eyes: Eyes | None = None,
 ) -> Result:
     """Every arena under every point, as `evaluate.run_all`: results [P, count], on the host."""
     kinds = jax.tree.leaves(points)[0].shape[0]
     point, arena = (grid.ravel() for grid in np.meshgrid(np.arange(kinds), np.arange(count), indexing="ij"))
     place = arena + seeds.shape[0] * population_of[point]
     jobs = Jobs(jnp.asarray(place), jnp.asarray(point), seeds[arena], jnp.int32(len(arena)))
-    result = walk(batch, points, jobs, static, config, on_progress)
+    result = walk(batch, points, jobs, static, config, on_progress, eyes=eyes)
     return jax.tree.map(lambda leaf: leaf.reshape(kinds, count), result)

@@ -1,5 +1,6 @@
 """Missions that see on the host: the same as those that see inside the compiled loop, whatever they see with."""
 
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -8,12 +9,13 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.scene import load_scene
-from jaxbiped.mission.cycle import sense
+from jaxbiped.mission.cycle import cycle, sense
 from jaxbiped.mission.eyes import eyes_for, where
+from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import start
-from jaxbiped.mission.stepped import run_logged
 from jaxbiped.sensing import camera as cameras
+from jaxbiped.study.evaluate import run_one_by_one
 from tests.mission.conftest import CONFIG, PROGRAM
 
 by_ray_cast = jax.jit(jax.vmap(partial(sense, program=PROGRAM, carriage=None)))
@@ -30,11 +32,26 @@ class Mirror:
 
 
 @pytest.mark.slow
-def test_mission_that_is_given_what_it_sees(population, played):
-    arena, setting, seed = (jax.tree.map(jnp.asarray, part[0]) for part in population[:3])
-    mission = run_logged(arena, setting, seed, PROGRAM, eyes=Mirror())
-    assert mission.code == played.code[0] and mission.measurements == played.measurements[0]
-    assert mission.distance == pytest.approx(played.distance[0], 1e-5)
+def test_missions_that_are_given_what_they_see(population, played):
+    """Two missions, one by one, as a study runs them: those of the queue."""
+    batch, seeds = jax.tree.map(lambda *rows: jnp.asarray(np.stack(rows)), *population[0][:2]), population[2][:2]
+    points = stack(population[1][:1])
+    ended = []
+    result = run_one_by_one(
+        batch, jnp.asarray(seeds), points, 2, PROGRAM, ended.append, Mirror(), population_of=np.zeros(1, int)
+    )
+    for k in np.flatnonzero([setting is population[1][0] for setting in population[1][:2]]):
+        for name in ("code", "measurements", "decisions"):
+            assert getattr(result, name)[0, k] == getattr(played, name)[k], name
+        for name in ("distance", "time", "goal_distance"):
+            assert getattr(result, name)[0, k] == pytest.approx(getattr(played, name)[k], 1e-5), name
+    assert [tally.ended for tally in ended] == [1, 2]
+
+
+def test_loop_does_not_stand_in_for_a_sensor_on_the_host(first_look):
+    static = replace(PROGRAM, sensor="stereo")
+    with pytest.raises(ValueError, match="given what they see"):
+        jax.eval_shape(partial(cycle, program=static), *first_look)
 
 
 def test_jax_sensors_need_no_eyes():
