@@ -97,7 +97,11 @@ def stand(cloud: Cloud, args: ClassifyArgs) -> Upright:
     upright = find_upright(cloud.points, up, math.radians(args.tilt), seed=args.seed)
     if upright is None:
         known = "--floor" if up is not None else "--up X Y Z, and --floor where the floor is not in it"
-        raise InputError(f"shows no floor that could be found; give {known}", file=args.cloud)
+        size = " x ".join(f"{float(f'{side:.3g}'):g}" for side in np.ptp(cloud.points, axis=0))
+        message = (
+            f"shows no floor that could be found in its {size} m; give {known} (and --scale, where it is not in metres)"
+        )
+        raise InputError(message, file=args.cloud)
     return upright
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -87,10 +88,10 @@ def load(path: str | Path, scale: float = 1.0) -> Cloud:
 
 def read_npz(path: Path) -> np.ndarray:
     """`points`, or `x`, `y` and `z`."""
+    if not zipfile.is_zipfile(path):
+        raise InputError("is no .npz, or was cut short", file=path)
     try:
         with np.load(path, allow_pickle=False) as archive:
-            if isinstance(archive, np.ndarray):
-                return archive
             if "points" in archive.files:
                 return archive["points"]
             if all(name in archive.files for name in "xyz"):
@@ -112,11 +113,17 @@ def read_ply(path: Path) -> np.ndarray:
     import trimesh
 
     with open(path, "rb") as file:
-        if file.read(3) != b"ply":
+        head = file.read(10_000)
+        if not head.startswith(b"ply"):
             raise InputError("is no PLY file: it must begin with ply", file=path)
         file.seek(0)
         shape = trimesh.load(file, file_type="ply", process=False)
-    return np.asarray(shape.vertices) if hasattr(shape, "vertices") else np.zeros((0, 3))
+    points = np.asarray(shape.vertices) if hasattr(shape, "vertices") else np.zeros((0, 3))
+    promised = re.search(rb"element vertex (\d+)", head)
+    if promised and len(points) < int(promised[1]):
+        message = f"was cut short: it holds {len(points)} of {int(promised[1])} points"
+        raise InputError(message, file=path)
+    return points
 
 
 def read_pcd(path: Path) -> np.ndarray:

@@ -12,7 +12,9 @@ from skimage import data
 
 from jaxbiped import cli
 from jaxbiped.commands import stereo
+from jaxbiped.commands.map_source import open_map
 from jaxbiped.commands.stereo import StereoArgs
+from jaxbiped.config import load_toml
 from jaxbiped.errors import InputError
 from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.grid import Cell
@@ -89,10 +91,9 @@ PLACES = {
 }
 
 
-def test_its_map_can_be_planned_on(mapped, tmp_path, capsys):
-    words = [str(mapped / "classes.npz"), "--start", "2", "0.3", "--goal", "3.2", "-1.3", "--out", str(tmp_path / "p")]
-    assert cli.main(["plan", *words]) == 0
-    assert "cost" in capsys.readouterr().out and (tmp_path / "p" / "path.csv").is_file()
+def test_plan_takes_its_map(mapped):
+    source = open_map(mapped / "classes.npz", pitch=0.05, radius=0.0)
+    assert source.kind == "class grid" and source.free_cell((2.0, 0.3), "start") == source.grid.cell_at((2.0, 0.3))
 
 
 def test_the_command_line(pair, tmp_path, capsys):
@@ -105,3 +106,82 @@ def test_the_command_line(pair, tmp_path, capsys):
     assert cli.main(["stereo", *map(str, pair[::-1]), "--camera", str(CAMERA), "--out", str(tmp_path / "p")]) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1 and "left and right look swapped" in error
+
+
+def with_changes(tmp_path, **changes):
+    """The motorcycle's camera file with other values."""
+    values = load_toml(CAMERA) | changes
+    lines = [f"{key} = {value}" for key, value in values.items() if not isinstance(value, dict) and value is not None]
+    tables = [
+        f"[{key}]\n" + "\n".join(f"{k} = {v}" for k, v in value.items())
+        for key, value in values.items()
+        if isinstance(value, dict)
+    ]
+    path = tmp_path / "camera.toml"
+    path.write_text("\n".join(lines + tables) + "\n")
+    return path
+
+
+def test_a_pose_in_the_camera_file(pair, tmp_path, capsys):
+    """One that the floor agrees with is refined by it; the floor is believed no more than 5 degrees off it."""
+    camera = with_changes(tmp_path, pose={"pitch": 17.0, "height": 1.0})
+    assert run(tmp_path, *pair, camera) == 0
+    assert "floor     found: camera 1.08" in capsys.readouterr().out
+    camera = with_changes(tmp_path, pose={"pitch": 30.0, "height": 1.0})
+    assert run(tmp_path, *pair, camera, out=tmp_path / "other") == 0
+    said = json.loads((tmp_path / "other" / "stereo.json").read_text())
+    assert (said["pitch_degrees"], said["height"]) == (pytest.approx(30), 1.0) and not said["floor_found"]
+    assert "pose      of the camera file, for no floor was found" in capsys.readouterr().out
+
+
+def cropped(pair, tmp_path, rows):
+    """Some rows of the pair alone."""
+    paths = []
+    for path in pair:
+        paths.append(tmp_path / path.name)
+        with Image.open(path) as image:
+            image.crop((0, rows.start, image.width, rows.stop)).save(paths[-1])
+    return paths
+
+
+def test_no_floor_in_view(pair, tmp_path):
+    """The upper third of the picture: wall, shelves and handlebars."""
+    paths = cropped(pair, tmp_path, slice(0, 160))
+    text = refused(tmp_path, *paths, with_changes(tmp_path, height=160))
+    assert text.startswith(f"{paths[0]}: shows no floor that could be found; give pitch and height of the camera")
+
+
+def test_grey_and_16_bit_pictures_give_the_same_map(mapped, pair, tmp_path):
+    paths = []
+    for path in pair:
+        paths.append(tmp_path / path.name)
+        with Image.open(path) as image:
+            Image.fromarray(np.asarray(image.convert("L")).astype(np.uint16) * 257).save(paths[-1])
+    assert run(tmp_path, *paths) == 0
+    deep, colour = (class_grid.load(folder / "classes.npz") for folder in (tmp_path / "out", mapped))
+    x0, y0 = np.maximum(deep.origin_xy, colour.origin_xy)
+    same = []
+    for x in np.arange(x0 + 0.025, 4.0, 0.05):
+        for y in np.arange(y0 + 0.025, 1.0, 0.05):
+            same.append(deep.classes[deep.cell_at((x, y))] == colour.classes[colour.cell_at((x, y))])
+    assert np.mean(same) > 0.97
+
+
+def test_what_is_refused(pair, tmp_path):
+    left, right = pair
+    small, _ = cropped(pair, tmp_path, slice(0, 400))
+    assert "right: must have the size of the left picture, 741 x 400" in refused(tmp_path, small, right)
+    assert "left: must be 741 x 500 px, as the camera file says" in refused(tmp_path, small, small)
+    assert "left and right look swapped" in refused(tmp_path, right, left)
+    assert "camera: no such file" in refused(tmp_path, left, right, tmp_path / "none.toml")
+    assert "no such file" in refused(tmp_path, tmp_path / "none.png", right)
+    absurd = with_changes(tmp_path, baseline=193.001)
+    assert "baseline: " in refused(tmp_path, left, right, absurd)
+    Image.new("L", (741, 500)).save(tmp_path / "black.png")
+    assert "is blank: every pixel is 0" in refused(tmp_path, left, tmp_path / "black.png")
+    (tmp_path / "cut.png").write_bytes(left.read_bytes()[:9000])
+    assert "is no picture, or is damaged" in refused(tmp_path, tmp_path / "cut.png", right)
+    assert "must show something within 0.5 m" in refused(tmp_path, left, right, max_range=0.5)
+    assert "right: must have" not in refused(tmp_path, left, left)  # one picture twice matches at 0 px, infinitely far
+    (tmp_path / "out").mkdir()
+    assert refused(tmp_path, left, right).startswith("out: must be a folder that does not exist yet")

@@ -1,0 +1,167 @@
+"""`jaxbiped classify` on clouds of known boxes, on to `plan`, and every way it refuses."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from jaxbiped import cli
+from jaxbiped.commands import classify
+from jaxbiped.commands.classify import ClassifyArgs
+from jaxbiped.errors import InputError
+from jaxbiped.mapping import class_grid
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.mapping.upright import FRAMES
+from jaxbiped.sensing.cloud import save_ply
+
+# What stands at a few places of `room`, metres
+PLACES = {(0.3, 0.3): Cell.FLOOR, (0.9, 0.8): Cell.BUMP, (1.5, 0.5): Cell.OBSTACLE, (1.475, 1.2): Cell.GATE}
+
+
+def room(noise=0.001, spacing=0.008):
+    """A floor of 2 x 1.6 m with a bump of 3 cm at x = 0.8 to 1, a low wall at y < 0.8 and a lintel at y > 0.9."""
+    rng = np.random.default_rng(0)
+
+    def face(low, high):
+        low, high = np.array(low, float), np.array(high, float)
+        flat = np.argmin(high - low)
+        area = np.prod(np.delete(high - low, flat))
+        return rng.uniform(low, high, (int(area / spacing**2), 3))
+
+    floor = face((0, 0, 0), (2, 1.6, 0))
+    floor[(floor[:, 0] > 0.8) & (floor[:, 0] < 1), 2] = 0.03
+    wall = [face((x, 0, 0), (x, 0.8, 0.3)) for x in (1.45, 1.55)] + [face((1.45, 0, 0.3), (1.55, 0.8, 0.3))]
+    lintel = [face((x, 0.9, 0.37), (x, 1.6, 0.45)) for x in (1.45, 1.5)] + [face((1.45, 0.9, 0.37), (1.5, 1.6, 0.37))]
+    points = np.concatenate([floor, *wall, *lintel])
+    return points + noise * rng.normal(size=points.shape)
+
+
+ROOM = room()
+
+
+def run(tmp_path, points, **options):
+    np.savez(tmp_path / "cloud.npz", points=points)
+    args = ClassifyArgs(cloud=tmp_path / "cloud.npz", **{"out": tmp_path / "out"} | options)
+    assert classify.main(args) == 0
+    return class_grid.load(tmp_path / "out" / "classes.npz")
+
+
+def refused(tmp_path, points=ROOM, **options):
+    """The message; nothing may be left behind."""
+    np.savez(tmp_path / "cloud.npz", points=points)
+    before = sorted(os.listdir(tmp_path))
+    with pytest.raises(InputError) as caught:
+        classify.main(ClassifyArgs(cloud=tmp_path / "cloud.npz", **{"out": tmp_path / "out"} | options))
+    assert sorted(os.listdir(tmp_path)) == before
+    return str(caught.value)
+
+
+def check(grid, away=(0.0, 0.0)):
+    found = {xy: grid.classes[grid.cell_at((xy[0] + away[0], xy[1] + away[1]))] for xy in PLACES}
+    assert found == PLACES
+
+
+def test_a_room(tmp_path, capsys):
+    check(run(tmp_path, ROOM))
+    text = capsys.readouterr().out
+    assert f"{len(ROOM)} points\n" in text and "floor     found: z is up but for 0.0" in text and "dropped" not in text
+    files = ["classes.npz", "classify.json", "map.png", "voxels.npz", "voxels.png"]
+    assert sorted(os.listdir(tmp_path / "out")) == files
+    words = ["plan", str(tmp_path / "out" / "classes.npz"), "--start", "0.3", "0.3", "--goal", "1.8", "1.2"]
+    assert cli.main([*words, "--out", str(tmp_path / "p")]) == 0
+    assert "gate" in (tmp_path / "p" / "path.csv").read_text()  # through it: the wall bars the other way
+
+
+def test_nan_is_dropped_and_said(tmp_path, capsys):
+    points = ROOM.copy()
+    points[::10] = np.nan
+    check(run(tmp_path, points))
+    assert f"; {len(points[::10])} that are NaN or infinite dropped" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("frame", ["-y", "y"])
+def test_other_frames_and_tilts(tmp_path, frame, capsys):
+    turn = Rotation.from_euler("xy", [6, -4], degrees=True).as_matrix()
+    run(tmp_path, (ROOM @ turn.T) @ FRAMES[frame])
+    assert f"found: {frame} is up but for 7.2" in capsys.readouterr().out
+    said = json.loads((tmp_path / "out" / "classify.json").read_text())
+    T = np.array(said["T_map_cloud"])
+    points = (ROOM @ turn.T) @ FRAMES[frame] @ T[:3, :3].T + T[:3, 3]
+    on_floor = ROOM[:, 2] < 0.01
+    assert np.abs(points[on_floor, 2]).max() < 0.012
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_map_projections(tmp_path, given, capsys):
+    """UTM coordinates: the map keeps them, to the cell, and heights are of the floor."""
+    away = np.array([450_000.0, 5_410_000.0, 312.4])
+    options = {"up": (0.0, 0.0, 1.0), "floor": 312.4} if given else {}
+    grid = run(tmp_path, ROOM + away, **options)
+    check(grid, away[:2])
+    assert grid.extent[0] == pytest.approx(450_000, abs=0.11) and grid.extent[2] == pytest.approx(5_410_000, abs=0.11)
+    text = capsys.readouterr().out
+    assert "far from 0" in text and ("floor     given: z is up" in text if given else "height 312.40" in text)
+
+
+def test_a_given_direction_and_millimetres(tmp_path, capsys):
+    check(run(tmp_path, ROOM * 1000, scale=0.001, up=(0.0, 0.0, 2.0), tilt=0.0))
+    assert "but for 0.00 degrees" in capsys.readouterr().out
+
+
+def test_an_area_and_a_pitch(tmp_path):
+    grid = run(tmp_path, ROOM, area=(0.2, 1.7, -0.3, 0.9), pitch=0.1)
+    assert grid.extent == pytest.approx((0.2, 1.7, -0.3, 0.9)) and grid.shape == (12, 15)
+    assert (grid.classes[:3] == Cell.UNMEASURED).all() and grid.classes[7, 3] == Cell.FLOOR
+
+
+def test_the_command_line(tmp_path, capsys):
+    save_ply(tmp_path / "room.ply", ROOM.astype(np.float32))
+    words = ["classify", str(tmp_path / "room.ply"), "--up", "0", "0", "1", "--robot.radius", "0.12", "--out"]
+    assert cli.main([*words, str(tmp_path / "o")]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        f"written   {tmp_path / 'o'}: classes.npz, voxels.npz, voxels.png, map.png, classify.json"
+    )
+    assert cli.main(["classify", str(tmp_path / "none.ply"), "--out", str(tmp_path / "p")]) == 2
+    assert capsys.readouterr().err == f"jaxbiped: {tmp_path / 'none.ply'}: no such file\n"
+
+
+def test_what_is_refused(tmp_path):
+    wall = np.random.default_rng(1).uniform((0, 0, 0), (3, 0.01, 2), (20_000, 3))
+    text = refused(tmp_path, wall, up=(0.0, 0.0, 1.0))
+    assert "cloud.npz: shows no floor that could be found in its 3 x 0.01 x 2 m; give --floor (and --scale" in text
+    text = refused(tmp_path, np.random.default_rng(2).uniform(0, 1, (20_000, 3)))
+    assert "give --up X Y Z, and --floor where the floor is not in it" in text
+    assert refused(tmp_path, np.zeros((0, 3))).endswith("cloud.npz: must hold finite points; it has none")
+    assert refused(tmp_path, floor=0.1) == "floor: goes with --up only (got 0.1)"
+    assert refused(tmp_path, up=(0.0, 0.0, 0.0)).startswith("up: must not be 0 0 0")
+    millimetres = ROOM * 1000
+    assert "in its 2000 x 1600 x 4" in refused(tmp_path, millimetres)
+    assert "pitch: must give at most 4,000,000 cells on the 20" in refused(
+        tmp_path, millimetres, up=(0.0, 0.0, 1.0), floor=0.0
+    )
+    assert "none is there" in refused(tmp_path, up=(0.0, 0.0, 1.0), floor=-20.0)
+    assert refused(tmp_path, area=(1.0, 0.0, 0.0, 1.0)).startswith("area: must be finite, X0 < X1 and Y0 < Y1")
+    (tmp_path / "out").mkdir()
+    assert refused(tmp_path).startswith("out: must be a folder that does not exist yet")
+
+
+def test_one_point_is_no_floor(tmp_path):
+    assert "no floor" in refused(tmp_path, np.zeros((1, 3)))
+
+
+@pytest.mark.slow
+def test_ten_million_points(tmp_path):
+    """In bounded memory: the points themselves are 120 MB."""
+    rng = np.random.default_rng(0)
+    points = rng.random((10_000_000, 3), np.float32) * np.float32([8, 8, 0.02])
+    np.save(tmp_path / "big.npy", points)
+    words = ["classify", str(tmp_path / "big.npy"), "--out", str(tmp_path / "o")]
+    subprocess.run([sys.executable, "-m", "jaxbiped.cli", *words], check=True, timeout=300)
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < 2_500_000  # [kB]; 1.2 GB with a PLY file
+    grid = class_grid.load(tmp_path / "o" / "classes.npz")
+    assert (grid.classes[:160, :160] == Cell.FLOOR).mean() > 0.99
