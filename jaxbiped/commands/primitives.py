@@ -10,6 +10,7 @@ import shlex
 import sys
 import time
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -24,6 +25,7 @@ from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.catalogue import PAPER, Pace, catalogue
 from jaxbiped.motion.gait import PrimitiveTable, generate
+from jaxbiped.motion.optimise import Goal, optimise
 from jaxbiped.motion.request import Request
 from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.physics.agreement import CROSSING, outcomes, paths
@@ -63,6 +65,9 @@ class PrimitivesArgs(Model):
 
     pace: Pace = "paper"
     """Table 2's durations, or as fast as servos and balance safely allow (as missions in simulation play them)."""
+    optimise: Goal | None = None
+    """Search phases and pressure points by gradient: `duration`, the shortest primitive within the servos' limits, or
+    `margin`, the widest stability margin at the pace's duration."""
     only: Annotated[tuple[Name, ...], pydantic.Field(min_length=1)] = tuple(PAPER)
     """Which primitives."""
     draws: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 128
@@ -104,7 +109,8 @@ def main(args: PrimitivesArgs) -> int:
     robot = load(RobotModelConfig, args.robot) if args.robot else RobotModelConfig()
     asked = {name: request for name, request in catalogue(args.pace, args.bump).items() if name in args.only}
     refuse_what_cannot_be(asked, robot, args)
-    tables = {name: generate(request, robot) for name, request in asked.items()}
+    make = partial(optimise, goal=args.optimise) if args.optimise else generate
+    tables = {name: make(request, robot) for name, request in asked.items()}
     console, start = Console(), time.perf_counter()
     if args.against:
         return agree(tables, robot, args, console)

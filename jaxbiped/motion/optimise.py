@@ -61,7 +61,7 @@ def optimise(
         shift[row, k] = 1.0
         if k + 1 < len(moves):
             shift[moves[k + 1], k] = -1.0
-    shift[:, -1] = 0.0  # the last change of feet goes to the middle, where every primitive ends
+    shift[:, -1:] = 0.0  # the last change of feet goes to the middle, where every primitive ends
     shift = jnp.asarray(np.pad(shift, ((0, 0), (0, PHASES - len(moves)))))
     fixed = goal == "margin"
     servo = robot.servo

@@ -137,3 +137,24 @@ def test_a_library_that_cannot_be_right(tmp_path, change, said):
     file.write_text(DEFAULT.read_text().replace(*change))
     with pytest.raises(InputError, match=said):
         load(LibraryConfig, file)
+
+
+@pytest.mark.slow
+def test_what_was_optimised_is_verified_like_all_else(here, capsys):
+    command = [
+        "primitives",
+        "--pace",
+        "fast",
+        "--only",
+        "turn",
+        "--draws",
+        "2",
+        "--no-videos",
+        "--optimise",
+        "duration",
+    ]
+    assert cli.main([*command, "--out", "quick"]) == 0
+    assert cli.main([*command[:-2], "--out", "plain"]) == 0
+    quick, plain = (pl.read_parquet(f"{out}/trials.parquet") for out in ("quick", "plain"))
+    assert quick.filter(pl.col("set").is_in(["nominal", "mild"]))["success"].all()
+    assert quick["simulated"][0] < plain["simulated"][0]

@@ -37,6 +37,12 @@ def test_a_wider_margin_is_found_in_the_same_time():
     walks(table)
 
 
+def test_a_movement_on_both_feet_has_no_pressure_points_to_move():
+    table, before = optimise(ask.squat().lasting(3.0), ROBOT, "duration", steps=25), ask.squat().lasting(3.0)
+    assert table.duration < before.duration
+    walks(table)
+
+
 def test_an_impossible_start_is_refused():
     with pytest.raises(InputError, match="no time"):
         optimise(START.lasting(0.4), ROBOT)
