@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int8
+from jaxtyping import Float, Float32, Int8, UInt8
 
 KINDS = ("obstacle", "bump", "gate")  # of an outline
 MARKS = ("circle", "square")  # of a landmark
@@ -29,6 +29,14 @@ class Mark:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """What one measurement looked like."""
+
+    left: UInt8[np.ndarray, "h w 3"]  # the left camera's image
+    disparity: Float32[np.ndarray, "h w"]  # [px]; 0 where nothing was measured
+
+
+@dataclass(frozen=True)
 class MissionLog:
     """`T` moments of one mission: the first before anything is done, then one after each action.
 
@@ -48,6 +56,7 @@ class MissionLog:
     goal_xy: Float[np.ndarray, "2"]  # [m]
     outlines: tuple[Outline, ...] = ()  # true boxes
     landmarks: tuple[Mark, ...] = ()
+    pictures: tuple[Picture, ...] = ()  # T of what the map was measured by last; none where no camera was rendered
     outcome: str = ""  # how it ended, "reached" say
 
     def __post_init__(self):
@@ -55,3 +64,5 @@ class MissionLog:
         for name in ("classes", "levels", "true_xyyaw", "estimated_xyyaw", "plan", "action"):
             if len(getattr(self, name)) != count or count == 0:
                 raise ValueError(f"{name} has {len(getattr(self, name))} moments, time has {count}; at least 1 each")
+        if len(self.pictures) not in (0, count):
+            raise ValueError(f"pictures has {len(self.pictures)} moments, time has {count}; as many, or none")

@@ -17,7 +17,7 @@ from jaxbiped.mapping import Cell
 from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import Thought, nearest_direction
 from jaxbiped.mission.eyes import Eyes
-from jaxbiped.mission.log import Mark, MissionLog, Outline
+from jaxbiped.mission.log import Mark, MissionLog, Outline, Picture
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind, World, start
@@ -104,6 +104,7 @@ class Recorder:
     ):
         self.settings, self.program, self.on_decision, self.eyes = settings, program, on_decision, eyes
         self.moments: list[dict] = []
+        self.pictures: list[Picture] = []
         self.played: list[Played] = []
         self.action = "Start"
         self.end: World | None = None
@@ -111,6 +112,8 @@ class Recorder:
     def decided(self, _: int, world: World, command: Command, thought: Thought) -> None:
         """One decision, before it is carried out."""
         self.moments.append(moment(world, thought, self.settings, self.program, self.action))
+        if shot := self.eyes and self.eyes.picture():
+            self.pictures.append(Picture(shot.left, shot.disparity))
         self.command = command
 
     def concluded(self, _: int, world: World, mind: Mind) -> None:
@@ -157,6 +160,7 @@ class Recorder:
             goal_xy=np.asarray(arena.goal_xy, float),
             outlines=outlines(arena),
             landmarks=marks(arena),
+            pictures=(*self.pictures, *self.pictures[-1:]),
             outcome=code.label,
         )
         played = tuple(self.played)

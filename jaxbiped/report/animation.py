@@ -7,7 +7,9 @@ from pathlib import Path
 
 import matplotlib.patches as patches
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
+from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -15,7 +17,7 @@ from matplotlib.transforms import Affine2D, Transform
 from PIL import Image
 
 from jaxbiped.files import write_whole
-from jaxbiped.mission.log import MissionLog
+from jaxbiped.mission.log import MissionLog, Picture
 from jaxbiped.report.pictures import (
     BUMP_SHADES,
     CENTIMETRES,
@@ -41,7 +43,8 @@ FIELD_OF_VIEW = math.radians(97)  # across, of the stereo camera
 VIEW_RANGE = 0.60  # [m] drawn; the camera sees farther
 WIDTH = 6.4  # [inch] of the figure
 FRAMES_PER_SECOND, LAST_FRAME = 5, 2.0  # [1/s], [s]
-COMMON_COLOURS = 120  # of the palette, besides the map's own
+COMMON_COLOURS, PICTURE_COLOURS = 120, 240  # of the palette, besides the map's own; with pictures beside it
+PICTURE_WIDTH = 3.2  # [inch] of them
 
 
 class Scene:
@@ -50,9 +53,16 @@ class Scene:
     def __init__(self, log: MissionLog, title: str, dpi: int):
         self.log, self.k, self.title = log, CENTIMETRES.per_metre, title
         height = WIDTH * float(log.size_xy[1] / log.size_xy[0]) + 0.75
-        self.figure = Figure(figsize=(WIDTH, height), dpi=dpi, layout="constrained")
+        beside = PICTURE_WIDTH if log.pictures else 0.0
+        self.figure = Figure(figsize=(WIDTH + beside, height), dpi=dpi, layout="constrained")
         self.canvas = FigureCanvasAgg(self.figure)
-        self.ax = self.figure.subplots()
+        if log.pictures:
+            layout = [["left", "map"], ["disparity", "map"]]
+            axes = self.figure.subplot_mosaic(layout, width_ratios=[beside, WIDTH])
+            self.ax = axes["map"]
+            self.draw_pictures(axes["left"], axes["disparity"])
+        else:
+            self.ax = self.figure.subplots()
         legend(self.figure, track=True, truth=bool(log.outlines))
         self.draw_still()
         self.image = self.ax.imshow(class_image(log.classes[0], log.levels[0]), origin="lower", extent=self.extent)
@@ -81,6 +91,17 @@ class Scene:
         ax.plot(*log.true_xyyaw[0, :2] * k, "o", ms=7, mfc="white", mec=INK, mew=1.4, zorder=4)
         draw_goal(ax, tuple(log.goal_xy), GOAL_RADIUS, k)
 
+    def draw_pictures(self, left: Axes, disparity: Axes) -> None:
+        """What the robot sees, and what it measures of it."""
+        pictures = self.log.pictures
+        self.nearest = max(float(np.quantile(each.disparity, 0.995)) for each in pictures) or 1.0
+        self.pictures = left.imshow(pictures[0].left), disparity.imshow(disparity_image(pictures[0], self.nearest))
+        for ax, name in ((left, "left image"), (disparity, "disparity: red is near, white not measured")):
+            ax.set_title(name, fontsize=9)
+            ax.set(xticks=[], yticks=[])
+            for spine in ax.spines.values():
+                spine.set(color="#888888", linewidth=0.8)
+
     def draw_moving(self) -> None:
         """What moves, at the origin of the robot's frame: view, track, plan, the robot and its belief."""
         ax, k = self.ax, self.k
@@ -103,6 +124,11 @@ class Scene:
         self.image.set_data(class_image(log.classes[t], log.levels[t]))
         self.track.set_data(*(log.true_xyyaw[: t + 1, :2] * k).T)
         self.plan.set_data(*(np.asarray(log.plan[t]).reshape(-1, 2) * k).T)
+        if log.pictures:
+            for artist, pixels in zip(
+                self.pictures, (log.pictures[t].left, disparity_image(log.pictures[t], self.nearest)), strict=True
+            ):
+                artist.set_data(pixels)
         true = self.at(log.true_xyyaw[t])
         for artist in (self.view, self.robot, self.nose):
             artist.set_transform(true)
@@ -125,6 +151,7 @@ class Scene:
 def save_gif(path: str | Path, log: MissionLog, *, title: str = "", dpi: int = 90) -> None:
     """Write a mission as GIF, one frame a moment at 5 frames a second, the last one held for 2 s.
 
+    Where the log has pictures, they stand beside the map, as in the paper's Figs. 3 and 6.
     The robot's true place is a filled footprint with its nose, its belief a dotted one; the wedge is the
     camera's field of view.
 
@@ -133,20 +160,26 @@ def save_gif(path: str | Path, log: MissionLog, *, title: str = "", dpi: int = 9
     """
     scene = Scene(log, title, dpi)
     frames = [scene.pixels(t) for t in range(len(log.time))]
-    palette = shared_palette(frames)
+    palette = shared_palette(frames, PICTURE_COLOURS if log.pictures else COMMON_COLOURS)
     frames = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     durations = [1000 // FRAMES_PER_SECOND] * (len(frames) - 1) + [round(LAST_FRAME * 1000)]
     options = {"save_all": True, "append_images": frames[1:], "duration": durations, "loop": 0}
     write_whole(path, lambda file: frames[0].save(file, format="GIF", **options))
 
 
-def shared_palette(frames: list[Image.Image]) -> Image.Image:
+def disparity_image(picture: Picture, nearest: float) -> UInt8[np.ndarray, "h w 3"]:
+    """Disparities as colours, from blue (far) to red (`nearest` px); white where nothing was measured."""
+    shade = colormaps["turbo"](np.clip(picture.disparity / nearest, 0, 1))[..., :3]
+    return np.where(picture.disparity[..., None] > 0, np.round(255 * shade), 255).astype(np.uint8)
+
+
+def shared_palette(frames: list[Image.Image], colours: int) -> Image.Image:
     """One palette for all frames: the map's own colours, and the commonest others of three frames.
 
     One for all, so that colours do not flicker; the map's own, so that a class seen in a few cells keeps its colour.
     """
     strip = np.concatenate([np.asarray(frame) for frame in (frames[0], frames[len(frames) // 2], frames[-1])])
-    common = Image.fromarray(strip).quantize(COMMON_COLOURS, method=Image.Quantize.MEDIANCUT).getpalette()
+    common = Image.fromarray(strip).quantize(colours, method=Image.Quantize.MEDIANCUT).getpalette()
     own = [round(255 * channel) for colour in (*COLOURS.values(), *BUMP_SHADES) for channel in to_rgb(colour)]
     palette = Image.new("P", (1, 1))
     palette.putpalette((own + common)[: 3 * 256])

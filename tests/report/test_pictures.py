@@ -4,6 +4,7 @@ import errno
 import itertools
 import os
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from PIL import Image
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mission.log import Mark, MissionLog, Outline
+from jaxbiped.mission.log import Mark, MissionLog, Outline, Picture
 from jaxbiped.report import animation, pictures
 
 
@@ -124,6 +125,23 @@ def test_a_film_of_one_moment(tmp_path):
     animation.save_gif(tmp_path / "m.gif", mission(1))
     with Image.open(tmp_path / "m.gif") as film:
         assert film.n_frames == 1
+
+
+def test_a_film_shows_what_the_robot_sees_beside_the_map(tmp_path):
+    plain, seen = mission(3), (np.full((60, 80, 3), grey, np.uint8) for grey in (40, 90, 200))
+    blank = np.zeros((60, 80), np.float32)
+    shown = tuple(Picture(left, np.where(np.arange(80) < 40, np.float32(30), blank)) for left in seen)
+    animation.save_gif(tmp_path / "plain.gif", plain)
+    animation.save_gif(tmp_path / "seen.gif", replace(plain, pictures=shown))
+    with Image.open(tmp_path / "plain.gif") as film, Image.open(tmp_path / "seen.gif") as wide:
+        assert wide.width > 1.3 * film.width and wide.height == film.height
+        for k, grey in enumerate((40, 90, 200)):
+            wide.seek(k)
+            frame = np.asarray(wide.convert("RGB")).astype(int)[:, : wide.width // 4]
+            assert (np.abs(frame - grey).max(-1) < 12).mean() > 0.15  # the left image
+            assert ((frame[..., 0] > 100) & (frame[..., 2] < 60)).mean() > 0.05  # the near half of the disparities
+    with pytest.raises(ValueError, match="pictures has 2 moments, time has 3"):
+        replace(plain, pictures=shown[:2])
 
 
 def test_thirty_frames_take_seconds_and_little_room(tmp_path):
