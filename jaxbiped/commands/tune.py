@@ -21,6 +21,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.library import load_library
 from jaxbiped.mission.settings import program
+from jaxbiped.motion.primitives import DurationConfig
 from jaxbiped.report.tables import to_markdown, to_rich
 from jaxbiped.report.tuning import costs_sheet, costs_toml, fits_sheet, gaps_sheet, missions, sentence, write_tuning
 from jaxbiped.study import store
@@ -107,7 +108,9 @@ def fits(config: TuneConfig, source: str) -> dict[str, Fit]:
 
 def fitted(config: TuneConfig, source: str, out: Path, command: str, console: Console) -> int:
     """`--from-durations`: costs in closed form. Writes those with measurements, which a mission's clock counts."""
-    title = "Costs from the times of Table 2" if source == "table" else "Costs from measured primitives"
+    measure = config.mission.durations.measure
+    table = "Table 2" if config.mission.durations == DurationConfig(measure=measure) else "the durations given"
+    title = f"Costs from {table if source == 'table' else 'measured primitives'}"
     found = fits(config, source)
     sheet = fits_sheet(found, title)
     last = list(found.values())[-1]

@@ -70,8 +70,8 @@ def fits_sheet(fits: Mapping[str, Fit], title: str) -> Sheet:
         ("least squares over", "C0", "C1", "C2", "C3", "a unit\ns", "rms\noff s"),
         (tuple(rows),),
         (
-            "Scaled so that a straight move on the floor costs 2. C4 cannot come from durations.",
-            "Straight moves alone do not tell C0 from C1: there C1 = C0, as in the paper.",
+            "Scaled: a straight move on the floor costs 2. C4 cannot come from durations.",
+            "Straight moves do not tell C0 from C1: there C1 = C0, as in the paper.",
         ),
     )
 

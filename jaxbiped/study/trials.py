@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -12,15 +13,16 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, compile_queue, tally
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, Work, compile_queue, tally
+from jaxbiped.mission.settings import MissionConfig, Settings, program
 from jaxbiped.planning import Costs
 from jaxbiped.study.evaluate import WORKERS, draw
 
-VECTORS, BLOCK = 8, 32  # cost vectors and arenas that one queue has room for
-SLOTS = 32  # missions at once: a queue that is not much longer than its slots idles most of them at its end
+VECTORS, BLOCK = 8, 16  # cost vectors and arenas that one queue has room for
+SLOTS = 16  # missions at once: a queue that is not much longer than its slots idles most of them at its end
 NAMES = ("c0", "c1", "c2", "c3", "c4")  # in the order of the cost vectors
 
 
@@ -61,30 +63,35 @@ class Trials:
             if stop.is_set():
                 raise InterruptedError
 
-        def play(piece: tuple[int, int]) -> None:
+        def deal(piece: tuple[int, int]) -> tuple[Work, tuple[Arena, Settings, Jobs], tuple[slice, slice]]:
             first, vector = piece
             here, vectors = index[first : first + BLOCK], costs[vector : vector + VECTORS]
-            count, pairs = len(here), len(here) * len(vectors)
             batch, seeds = draw(key, jnp.asarray(np.resize(here, BLOCK)), self.families)
             columns = np.resize(vectors, (VECTORS, 5)).T.astype(np.float32)
             points = replace(settings, costs=Costs(*(jnp.asarray(column) for column in columns)))
-            arena, point = np.arange(length) % count, np.arange(length) // count % len(vectors)
-            jobs = Jobs(jnp.asarray(arena), jnp.asarray(point), seeds[arena], jnp.int32(pairs))
-            work = compile_queue(batch, points, jobs, static, SLOTS)
-            result = jax.device_get(work(batch, points, jobs, look))
+            arena, point = np.arange(length) % len(here), np.arange(length) // len(here) % len(vectors)
+            jobs = Jobs(jnp.asarray(arena), jnp.asarray(point), seeds[arena], jnp.int32(len(here) * len(vectors)))
+            place = slice(vector, vector + len(vectors)), slice(first, first + len(here))
+            return compile_queue(batch, points, jobs, static, SLOTS), (batch, points, jobs), place
+
+        def play(piece: tuple[int, int]) -> None:
+            work, dealt, place = deal(piece)
+            result = jax.device_get(work(*dealt, look))
+            shape = jax.tree.leaves(out)[0][place].shape
             for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):
-                rows[vector : vector + VECTORS, first : first + BLOCK] = found[:pairs].reshape(len(vectors), count)
+                rows[place] = found[: math.prod(shape)].reshape(shape)
             with lock:
-                done[0] += tally(result.code[:pairs])
+                done[0] += tally(result.code[: math.prod(shape)])
                 on_progress(done[0])
 
         if pieces:
-            play(pieces[0])  # compiles, once
+            deal(pieces[0])  # compiles, once
+        # All missions are played by other threads: an interrupt here must not leave a running program behind.
         with ThreadPoolExecutor(WORKERS) as pool:
             try:
-                list(pool.map(play, pieces[1:]))
+                list(pool.map(play, pieces))
             except BaseException:
-                stop.set()  # an interrupt shall not wait for all queues
+                stop.set()  # it shall not wait for all queues either
                 pool.shutdown(cancel_futures=True)
                 raise
         return out
