@@ -14,7 +14,7 @@ from jaxbiped.files import write_whole
 from jaxbiped.report.answer import answer
 from jaxbiped.report.examples import example_section
 from jaxbiped.report.figures import write_figures
-from jaxbiped.report.page import PAGE, page_of, render
+from jaxbiped.report.page import PAGE, Section, page_of, render
 from jaxbiped.report.stopping import stopping_sentences
 from jaxbiped.report.tables import markdown_sheets, to_markdown
 from jaxbiped.report.words import number
@@ -71,12 +71,7 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, e
     frame = frame.filter(pl.col("point") == point)
     remarks = () if manifest.state == "finished" else (unfinished(comparison, manifest),)
     remarks += stopping_sentences(folder)
-    more = ()
-    if examples and comparison.question:
-        values = open_values(folder, point)
-        origins = tuple(Origin(manifest, point, values, name) for name in comparison.question)
-        section = example_section(frame, comparison.question, origins, examples)
-        more = (section,) if section else ()
+    more = looked_at(folder, frame, comparison, manifest, examples)
     page = page_of(
         frame,
         comparison,
@@ -94,10 +89,17 @@ def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, e
     return Report(folder, comparison, manifest, answer(comparison), files, remarks)
 
 
-def open_values(folder: Path, point: int) -> dict[str, float]:
-    """The swept fields at one sweep point of a folder, by their dotted names."""
-    row = read_points(folder).filter(pl.col("point") == point).row(0, named=True)
-    return {name: value for name, value in row.items() if name != "point"}
+def looked_at(
+    folder: Path, frame: pl.DataFrame, comparison: Comparison, manifest: Manifest, count: int
+) -> tuple[Section, ...]:
+    """A section with the missions of `count` arenas where the strategies of the question differ most, if any."""
+    if count == 0 or comparison.question is None:
+        return ()
+    values = read_points(folder).filter(pl.col("point") == comparison.point).row(0, named=True)
+    point = values.pop("point")
+    origins = tuple(Origin(manifest, point, values, name) for name in comparison.question)
+    section = example_section(frame, comparison.question, origins, count)
+    return (section,) if section else ()
 
 
 def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str], remarks: tuple[str, ...] = ()) -> str:

@@ -15,6 +15,7 @@ from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.config import parse
 from jaxbiped.errors import InputError
+from jaxbiped.mission.eyes import eyes_for
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.mission.stepped import Mission, run_logged
@@ -95,10 +96,9 @@ def play_again(
 
         rehearse(config)
         play = partial(walk_logged, config=config.walk)
-    settings = config.settings(strategy)
-    return [
-        play(jax.tree.map(lambda leaf, k=k: leaf[k], batch), settings, seeds[k], static) for k in range(len(arenas))
-    ]
+    settings, eyes = config.settings(strategy), eyes_for(config)
+    each = [jax.tree.map(lambda leaf, k=k: leaf[k], batch) for k in range(len(arenas))]
+    return [play(arena, settings, seed, static, eyes=eyes) for arena, seed in zip(each, seeds, strict=True)]
 
 
 def mission_of(
