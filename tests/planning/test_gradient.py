@@ -97,14 +97,15 @@ def test_scalar_costs_add_up_the_arenas_and_euler(maps):
 def test_counts_of_a_path_by_hand():
     """Floor, gate, floor, up, down, unmeasured, in a row one cell wide; then an oblique move."""
     row = [Cell.FLOOR, Cell.GATE, Cell.FLOOR, Cell.BUMP, Cell.FLOOR, Cell.FLOOR, Cell.UNMEASURED, Cell.FLOOR]
-    classes = np.full((1, 2, 9), Cell.OBSTACLE, np.int8)
-    classes[0, 0, :8], classes[0, 1, 8], classes[0, 0, 8], classes[0, 1, 7] = row, Cell.FLOOR, Cell.FLOOR, Cell.FLOOR
+    classes = np.full((B, H, W), Cell.OBSTACLE, np.int8)
+    classes[:, 0, :8], classes[:, 0, 8], classes[:, 1, 7:] = row, Cell.FLOOR, Cell.FLOOR
     levels = (classes == Cell.BUMP).astype(np.int8)
-    start_ij, goal_ij = np.array([[0, 0]]), np.array([[1, 8]])
-    cost, gradient = gradients((classes, levels, start_ij, goal_ij), PAPER[None])
-    np.testing.assert_allclose(gradient[0], [7 + np.sqrt(2), 2, 2, 2, 2], rtol=1e-6)
+    start_ij, goal_ij = np.full((B, 2), [0, 0]), np.full((B, 2), [1, 8])
+    paper = np.tile(PAPER, (B, 1))
+    cost, gradient = gradients((classes, levels, start_ij, goal_ij), paper)
+    np.testing.assert_allclose(gradient, np.tile([7 + np.sqrt(2), 2, 2, 2, 2], (B, 1)), rtol=1e-6)
     np.testing.assert_allclose(cost, gradient @ PAPER, rtol=ROUNDING)
-    short, none = gradients((classes, levels, start_ij, goal_ij), PAPER[None], max_length=7)
+    short, none = gradients((classes, levels, start_ij, goal_ij), paper, max_length=7)
     assert np.isinf(short).all() and not none.any()
 
 
