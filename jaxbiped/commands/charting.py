@@ -14,7 +14,7 @@ from pydantic import Field
 from jaxbiped.config import Model
 from jaxbiped.files import write_whole
 from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.chart import CHART, PIXELS, Chart, lay_out, make_chart
+from jaxbiped.mapping.chart import PIXELS, SCAN, Chart, lay_out, make_chart
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.params import MapConfig
 from jaxbiped.motion.robot import RobotConfig
@@ -33,7 +33,7 @@ class ChartArgs(Model):
     """[m] What to map. Default: what the points cover."""
     robot: RobotConfig = RobotConfig()
     """The robot that the map is for."""
-    map: MapConfig = CHART
+    map: MapConfig = SCAN
     """Thresholds of the map, in pixels; 1 cm2 of surface counts as 8."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     """Of the search for the floor."""

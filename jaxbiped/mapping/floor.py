@@ -5,7 +5,7 @@ Host code in float64: clouds may lie far from their origin and hold millions of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,11 @@ TRIPLES = 60_000  # planes through three places that are looked at
 SCORED = 600  # of these, that point up, are scored on SCORED_PLACES places
 SCORED_PLACES = 4_000
 REFINED = 12  # the best of these are refined on all places
+INLIERS = 0.008, 0.016, 0.032  # [m]
+FINE, CONTRAST = (
+    0.01,
+    1.5,
+)  # [m] with a wider tolerance, a floor has so many times the places of the layer above: no fog
 LEAST_SHARE = 0.05  # of the places must lie on the floor
 LEAST_SPREAD = 0.06  # [m] standard deviation of the floor's places across its narrow direction: no slice of a wall
 BELOW_PRICE = 2.0  # a place below the floor costs as much as two on it gain: a table is no floor, nor is a ceiling
@@ -36,7 +41,7 @@ def find_floor(
     up: Float[np.ndarray, "3"],
     cone: float,
     *,
-    inlier: float = 0.015,
+    inliers: tuple[float, ...] = INLIERS,
     place: float = 0.03,
     above: Float[np.ndarray, "3"] | None = None,
     seed: int = 0,
@@ -46,13 +51,14 @@ def find_floor(
     Points are first made into places, one a cube of side `place`, so that area counts and not density. Planes through
     three random places whose upward normal lies within `cone` of `up` are scored by the places on them less twice
     those below; the best are refined by reweighted least squares (Tukey's biweight), and the best of those wins. It
-    must hold 5 % of all places and be no mere strip.
+    must hold 5 % of all places and be no mere strip. Where none does, the cloud may be a noisy one: the next, wider
+    tolerance is tried. (The narrowest must be well below half a step: else a slope laid across stairs wins.)
 
     Args:
       points: [m] finite.
       up: direction against gravity, as far as it is known.
       cone: [rad] by which it may be off, 0 to pi / 2; 0 takes `up` as it is and finds the height alone.
-      inlier: [m] from the floor within which a place lies on it.
+      inliers: [m] from the floor within which a place lies on it, one tried after the other.
       place: [m] side of a place; greater for clouds so wide that there would be too many.
       above: [m] a point that is above the floor for sure, such as the camera.
       seed: of the draws.
@@ -71,29 +77,35 @@ def find_floor(
         normals, offsets = normals[over], offsets[over]
     if not len(normals):
         return None
-    scores = score(fewer, normals, offsets, inlier)
-    best = None
-    for k in np.argsort(-scores, kind="stable")[:REFINED]:
-        normal, offset = refine(places, normals[k], offsets[k], inlier, fixed=bool(cone == 0))
-        value = score(places, normal[None], np.array([offset]), inlier)[0]
-        if normal @ up < np.cos(cone) - 1e-9 or (above is not None and normal @ (above - centre) <= offset):
-            continue
-        if best is None or value > best[0]:
-            best = value, normal, offset
-    if best is None:
-        return None
-    _, normal, offset = best
-    distance = places @ normal - offset
+    allowed = np.cos(cone) - 1e-9
+    for inlier in inliers:
+        best = None
+        for k in np.argsort(-score(fewer, normals, offsets, inlier), kind="stable")[:REFINED]:
+            normal, offset = refine(places, normals[k], offsets[k], inlier, fixed=bool(cone == 0))
+            value = score(places, normal[None], np.array([offset]), inlier)[0]
+            if normal @ up < allowed or (above is not None and normal @ (above - centre) <= offset):
+                continue
+            if best is None or value > best[0]:
+                best = value, normal, offset
+        floor = None if best is None else check_floor(places, *best, inlier)
+        if floor is not None:
+            return replace(floor, offset=float(floor.offset + floor.up @ centre))
+    return None
+
+
+def check_floor(
+    places: Float[np.ndarray, "M 3"], value: float, up: Float[np.ndarray, "3"], offset: float, inlier: float
+) -> Floor | None:
+    """A plane of a given score as a floor, or None when it is too little or too narrow."""
+    distance = places @ up - offset
     on = np.abs(distance) < inlier
-    if best[0] < LEAST_SHARE * len(places) or narrow_spread(places[on]) < LEAST_SPREAD:
+    if value < LEAST_SHARE * len(places) or narrow_spread(places[on]) < LEAST_SPREAD:
         return None
-    return Floor(
-        up=normal,
-        offset=float(offset + normal @ centre),
-        share=float(on.mean()),
-        score=float(best[0] / len(places)),
-        spread=float(np.sqrt(np.mean(distance[on] ** 2))),
-    )
+    above = (distance > 2 * inlier) & (distance < 4 * inlier)  # as thick a layer
+    if inlier > FINE and on.sum() < CONTRAST * above.sum():
+        return None
+    spread = float(np.sqrt(np.mean(distance[on] ** 2)))
+    return Floor(up, float(offset), float(on.mean()), float(value / len(places)), spread)
 
 
 def to_places(points: Float[np.ndarray, "N 3"], side: float, rng: np.random.Generator) -> Float[np.ndarray, "M 3"]:

@@ -133,3 +133,21 @@ def test_the_camera_is_above_the_floor():
 def test_a_seed_gives_the_same_floor():
     first, second = (find_floor(room(), UP, 0.5, seed=3) for _ in range(2))
     np.testing.assert_array_equal(first.up, second.up)
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.006, 0.012, 0.02])
+def test_noisy_floors(noise):
+    """The tolerance widens until a floor is found."""
+    points, R = turned(room(noise=noise), (1, -1, 0), 6)
+    floor = find_floor(points, UP, np.radians(20))
+    # What a noisy table, a bump and the foot of walls add is not symmetric: some tenths of the noise.
+    assert off(floor.up, R @ UP) < 0.1 + 15 * noise and abs(floor.offset) < 0.003 + 0.3 * noise
+
+
+def test_stairs_are_no_slope():
+    """Five treads of 3 cm: a plane laid across them holds more places within 15 mm than the floor does."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform((0, 0, 0), (1.8, 1.4, 0), (40_000, 3))
+    points[:, 2] = 0.03 * np.clip(np.floor((points[:, 0] - 0.6) / 0.2), 0, 4)
+    floor = find_floor(points + 0.002 * rng.normal(size=points.shape), UP, np.radians(30))
+    assert off(floor.up, UP) < 0.3 and abs(floor.offset) < 0.005
