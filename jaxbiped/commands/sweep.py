@@ -11,6 +11,7 @@ from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import refuse_existing
 from jaxbiped.mission.settings import SIMULATED
+from jaxbiped.report.sweep import terminal, write_sweep_report
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.evaluate import WORKERS
 from jaxbiped.study.groups import group_points
@@ -64,5 +65,8 @@ def main(args: SweepArgs) -> int:
     with progress(console) as show:
         manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
-    console.print(f"{manifest.rows} missions in {spent}; written {out}", highlight=False)
+    report = write_sweep_report(out)
+    console.print(terminal(report))
+    names = ", ".join(["rows", "points.parquet", "manifest.json", *(path.name for path in report.files)])
+    console.print(f"{manifest.rows} missions in {spent}; written {out}: {names}", highlight=False)
     return 0

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import numpy as np
 import pydantic
+from jaxtyping import Float
 from pydantic_core import PydanticCustomError
 from scipy.stats import qmc
 
@@ -36,7 +37,7 @@ class Range(Model):
 
     def numbers(self) -> tuple[float, ...]:
         """The values."""
-        return tuple(np.linspace(self.start, self.stop, self.num).tolist())
+        return plain(np.linspace(self.start, self.stop, self.num))
 
 
 class LogRange(Range):
@@ -46,7 +47,7 @@ class LogRange(Range):
         return True
 
     def numbers(self) -> tuple[float, ...]:
-        return tuple(np.geomspace(self.start, self.stop, self.num).tolist())
+        return plain(np.geomspace(self.start, self.stop, self.num))
 
 
 class Axis(Model):
@@ -125,6 +126,11 @@ class Sobol(Model):
                 low, high = self.log_range[name]
                 columns[name] = low * (high / low) ** share
         return [dict(zip(columns, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def plain(numbers: Float[np.ndarray, "n"]) -> tuple[float, ...]:
+    """With twelve digits: 10, where a power of a root gives 10.000000000000002."""
+    return tuple(float(f"{number:.12g}") for number in numbers)
 
 
 def check_bounds(bounds: Bounds, low: str, high: str, log: bool) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-import jax
 import numpy as np
 from jaxtyping import Int
 
@@ -83,7 +82,7 @@ def group(
     """The points of one program."""
     settings = []
     for point in points:
-        first = jax.device_get(point.mission.settings(strategies[0]))
+        first = point.mission.settings(strategies[0])
         cutting = point.mission.corner_cutting
         settings += [replace(first, strategy=strategy(name, cutting)) for name in strategies]
     different = list(dict.fromkeys(point.population for point in points))

@@ -10,9 +10,9 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.queue import SLOTS
 from jaxbiped.mission.settings import Program
 
-# Bytes, measured as growth of the resident memory and rounded up (`sweeps/bench_sweep.py --memory`).
-POINT = 60_000  # a sweep point: its config
-SETTING = 4_000  # and its numbers, for each strategy
+# Bytes, measured as growth of the resident memory, and rounded up.
+POINT = 25_000  # a sweep point: its config
+SETTING = 35_000  # and its numbers, for each strategy
 ROW = 2_000  # a mission of a shard: its job, its result on both sides, its row
 MAPS = 4  # copies of a slot's map: the queue's, and what an update makes of it
 SHARE = 0.8  # of the memory that there is

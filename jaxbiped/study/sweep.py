@@ -32,6 +32,10 @@ class SweepConfig(StudyConfig):
     share one program unless array shapes differ.
     """
 
+    question: str = ""
+    """What it asks, for its report."""
+    base: bool = False
+    """Whether the config with nothing changed is a point of its own, the first: what others are compared with."""
     axes: Annotated[tuple[Axis, ...], tyro.conf.Fixed] = ()
     sobol: Annotated[Sobol | None, tyro.conf.Fixed] = None
 
@@ -50,7 +54,9 @@ class SweepConfig(StudyConfig):
 
     def size(self) -> int:
         """How many points there are."""
-        return math.prod(len(axis.numbers()) for axis in self.axes) * (self.sobol.points if self.sobol else 1)
+        return self.base + math.prod(len(axis.numbers()) for axis in self.axes) * (
+            self.sobol.points if self.sobol else 1
+        )
 
     def points(self) -> Iterator[Point]:
         """The sweep points, each of them validated; one alone where nothing is swept.
@@ -71,7 +77,14 @@ class SweepConfig(StudyConfig):
             check_field(name, mission | {POPULATION: population})
             if name.startswith(f"{POPULATION}.bump") and "bump" not in self.families:
                 raise InputError("needs the family bump among the families", field=f"axis {name}")
-        for index, values in enumerate(self.combinations()):
+        own = []
+        if self.base:
+            leaves = dict(flat(mission | {POPULATION: population}))
+            own = [{name: leaves[name] for name in fields}]
+            for name in fields:
+                if leaves[name] is None:
+                    raise InputError("has no value in the config for the base point; give it one", field=name)
+        for index, values in enumerate(itertools.chain(own, self.combinations())):
             yield point_at(index, values, mission, population)
 
     def combinations(self) -> Iterator[dict[str, float]]:
