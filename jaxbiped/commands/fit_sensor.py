@@ -1,0 +1,122 @@
+"""`jaxbiped fit-sensor`: the noise of the ray-cast sensor, fitted to rendered pairs of a camera."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import pydantic
+from rich.console import Console
+from rich.progress import track
+
+from jaxbiped import config
+from jaxbiped.arenas.arena import CIRCLE
+from jaxbiped.config import Model, config_hash
+from jaxbiped.files import refuse_existing, write_whole
+from jaxbiped.mapping import Cell
+from jaxbiped.mission.eyes import StereoEyes
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.noise import NoiseConfig
+from jaxbiped.study.fitting import Fit, fit, sensor_toml
+from jaxbiped.study.sensors import Place, fused, looking, mission, same, score, worlds
+
+
+class FitSensorArgs(Model):
+    """Render arenas, watch the matcher and the landmarks, fit the noise of the ray-cast sensor to what is seen, and
+    print how close the two sensors come on other arenas. The file that is written goes with --preset."""
+
+    camera: Path | None = None
+    """A camera file (TOML); default: the paper's camera."""
+    arenas: Annotated[int, pydantic.Field(ge=1, le=1000)] = 12
+    """Random arenas that are fitted to, all families in turn; as many others are for comparison."""
+    views: Annotated[int, pydantic.Field(ge=1, le=1000)] = 10
+    """Places in each, aimed at gates, bumps and obstacles."""
+    missions: Annotated[int, pydantic.Field(ge=0, le=1000)] = 12
+    """Of both sensors, on the arenas for comparison."""
+    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 1
+    """Of the arenas, the places and all noise."""
+    out: Path | None = None
+    """Sensor file to write, which must not exist. Default: results/fit-sensor-<hash of these options>.toml"""
+
+
+def main(args: FitSensorArgs) -> int:
+    """Run the command.
+
+    Returns:
+      Exit status 0.
+
+    Raises:
+      InputError: a bad camera file, nothing can be rendered here, or the file exists or cannot be written.
+    """
+    camera = config.load(CameraConfig, args.camera) if args.camera else CameraConfig()
+    out = args.out or Path("results") / f"fit-sensor-{config_hash(args.model_copy(update={'out': None}))}.toml"
+    refuse_existing(out)
+    rendered = MissionConfig(sensor="stereo", camera=camera)
+    with contextlib.closing(StereoEyes(camera)) as eyes:
+        places = list(worlds(args.seed, 0, args.arenas, args.views, rendered))
+        print(f"camera     {camera.width} x {camera.height} px, {camera.field_of_view:g} degrees, "
+              f"baseline {100 * camera.baseline:g} cm, {camera.image_noise:g} grey levels of noise")  # fmt: skip
+        found = fit(places, eyes, rendered)
+        said = sentences(found, args)
+        print("\n".join(said))
+        out.parent.mkdir(parents=True, exist_ok=True)
+        heading = [f"Written by `jaxbiped fit-sensor --arenas {args.arenas} --views {args.views} --seed {args.seed}`.",
+                   *said, "Fitted: what pictures tell. The rest is the base's: the attitude's error, say."]  # fmt: skip
+        text = sensor_toml(found, heading)
+        write_whole(out, lambda file: file.write(text.encode()))
+        others = list(worlds(args.seed, args.arenas, args.arenas, args.views, rendered))
+        compare(others, eyes, rendered, found, args.missions)
+    print(f"written    {out}")
+    return 0
+
+
+def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
+    """What was measured, for people."""
+    q, stereo, marks = found.quality, found.sensor.stereo, found.sensor.landmarks
+    seen = [sight for sight in found.sights if sight.error is not None]
+    discs = sum(sight.kind == CIRCLE for sight in seen)
+    off = np.median([np.hypot(*sight.error) for sight in seen]) if seen else np.nan
+    return [
+        f"matcher    {args.arenas} arenas, {found.views} views: bias {q.bias:+.3f} px, sd {q.sd:.3f} px; "
+        f"{q.measured:.1%} measured of what both cameras see, {q.wrong:.1%} of that beyond 1 px",
+        f"nothing    {q.phantoms:.1%} of what one camera sees comes out as something wild; {found.plain:.1%} of plain "
+        f"surfaces do; half is measured at a contrast of {stereo.min_contrast:.2f}",
+        f"landmarks  {len(seen)} found ({discs} discs) of {len(found.sights)} in view, {1e3 * off:.1f} mm off in the "
+        f"median; sd {1e3 * marks.sd:.1f} mm + {1e3 * marks.sd_per_metre:.1f} mm/m; discs to "
+        f"{marks.furthest_circle:.2f} m, squares to {marks.furthest_square:.2f} m",
+    ]
+
+
+def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, found: Fit, missions: int) -> None:
+    """Print how close both sensors come on arenas that were not fitted to: with the fitted noise, and as it was."""
+    fitted = rendered.model_copy(update={"sensor": "raycast"} | {
+        "stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})  # fmt: skip
+    before = rendered.model_copy(update={"sensor": "raycast", "stereo": NoiseConfig()})
+    maps = {"stereo": [], "fitted": [], "before": []}
+    each = {"stereo": (rendered, eyes), "fitted": (fitted, None), "before": (before, None)}
+    show = Console(stderr=True)
+    for place in track(places, description="maps", console=show, transient=True):
+        for name, (how, sees) in each.items():
+            maps[name].append(fused(place, looking(how, sees), how)[0])
+    stereo, ours, theirs = (np.stack(maps[name]) for name in each)
+    count = len(places) * len(places[0].poses)
+    known = (stereo != Cell.UNMEASURED) | (ours != Cell.UNMEASURED)
+    print(f"maps       {len(places)} other arenas, {count} views: {np.mean(stereo == ours):.1%} of all cells the same, "
+          f"{np.mean((stereo == ours)[known]):.1%} of those that either measured "
+          f"(as it was: {np.mean(stereo == theirs):.1%})")  # fmt: skip
+    for name, made in (("stereo", stereo), ("fitted", ours)):
+        rated = score(list(made), [place.classes for place in places])
+        kinds = ", ".join(f"{kind} {rated.recall[kind]:.3f} / {rated.precision[kind]:.3f}" for kind in rated.recall)
+        print(f"{name:<10} right {rated.right:.3f}; recall / precision within one cell: {kinds}")
+    if missions:
+        pairs = [(mission(place, rendered, eyes), mission(place, fitted, None)) for place in
+                 track(places[:missions], description="missions", console=show, transient=True)]  # fmt: skip
+        alike = sum(same(*pair) for pair in pairs)
+        print(f"missions   {alike} of {len(pairs)} ended alike (code, and distance and time within 10 %)")
+        for k, pair in enumerate(pairs):
+            if not same(*pair):
+                told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
+                print(f"           other arena {k}: {told}")

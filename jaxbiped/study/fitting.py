@@ -1,0 +1,148 @@
+"""Everything that `jaxbiped fit-sensor` measures of a rendered stereo camera, and the sensor file that comes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.eyes import StereoEyes, where
+from jaxbiped.mission.settings import MissionConfig, Settings, program
+from jaxbiped.sensing.camera import Mount
+from jaxbiped.sensing.landmarks import LandmarkConfig, sight
+from jaxbiped.sensing.presets import SensorConfig
+from jaxbiped.sensing.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
+from jaxbiped.sensing.stereo.fit_landmarks import Sight, fit_landmarks
+from jaxbiped.study.sensors import AREA, Place, standing
+
+CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # at which the least one that can be matched is looked for
+CONTRAST_PLACES, CONTRAST_VIEWS = 3, 2
+NEVER_FURTHER = LandmarkConfig(sd=0, sd_per_metre=0, nearest=0, furthest_circle=100, furthest_square=100)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A sensor file, and what it was fitted to."""
+
+    sensor: SensorConfig
+    quality: Quality  # of the matcher, on textured surfaces
+    plain: float  # share of surfaces without texture, rims left out, that comes out as something
+    sights: tuple[Sight, ...]  # landmarks
+    views: int
+
+
+def fit(
+    places: Sequence[Place], eyes: StereoEyes, config: MissionConfig, tell: Callable[[], None] = lambda: None
+) -> Fit:
+    """Watch the matcher and the landmarks in all places, and fit the models of both.
+
+    Args:
+      config: of the missions; its own noise is the base, for what cannot be measured in pictures.
+      tell: called after each view.
+    """
+    settings = config.settings("full")
+    watched, sights, count = [], [], 0
+    for place in places:
+        count += len(place.poses)
+        sights += [one for n in range(len(place.poses)) for one in landmarks_of(place, n, eyes, settings, config)]
+        bare = replace(place, arena=unmarked(place.arena))
+        for n in range(len(place.poses)):
+            watched.append(watch_from(bare, n, eyes, settings, config))
+            tell()
+    least, plain = least_contrast(places, eyes, settings, config)
+    seen = together(watched)
+    stereo = fit_noise(seen, config.stereo).model_copy(update={"min_contrast": round(least, 4)})
+    return Fit(
+        SensorConfig(stereo=stereo, landmarks=fit_landmarks(sights, config.landmarks)),
+        quality(seen),
+        plain,
+        tuple(sights),
+        count,
+    )
+
+
+def eye(
+    place: Place, number: int, settings: Settings, config: MissionConfig
+) -> tuple[np.ndarray, np.ndarray, Mount, int]:
+    """Where the camera really is in view `number` of a place, where it is believed to sit, and the view's seed."""
+    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
+    seed = jnp.asarray(place.seed, jnp.uint32)[None]
+    world, mind = standing(*batch, seed, place.poses[number], jnp.int32(number), program(config, AREA))
+    return jax.tree.map(lambda leaf: leaf[0], jax.device_get(where(world, mind, batch[1], None)))
+
+
+def watch_from(place: Place, number: int, eyes: StereoEyes, settings: Settings, config: MissionConfig) -> Watched:
+    """The matcher in one view."""
+    origin, basis, _, seed = eye(place, number, settings, config)
+    eyes.sensor.show(place.arena)
+    return watch(eyes.sensor, origin, basis, int(seed))
+
+
+def landmarks_of(place: Place, number: int, eyes: StereoEyes, settings: Settings, config: MissionConfig) -> list[Sight]:
+    """Landmarks that lie in view of both cameras, found or not."""
+    pose = place.poses[number]
+    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
+    seed = jnp.asarray(place.seed, jnp.uint32)[None]
+    world, mind = standing(*batch, seed, pose, jnp.int32(number), program(config, AREA))
+    _, found = eyes.see(world, mind, *batch)
+    there = in_view(place.arena, pose, settings, config)
+    sights = []
+    for n in np.flatnonzero(there.seen):
+        x, y = float(there.x[n]), float(there.y[n])
+        error = (float(found.x[0, n]) - x, float(found.y[0, n]) - y) if found.seen[0, n] else None
+        sights.append(Sight(int(place.arena.landmarks.kind[n]), float(np.hypot(x, y)), error))
+    return sights
+
+
+def in_view(arena: Arena, pose: Pose, settings: Settings, config: MissionConfig):
+    """Landmarks whose centres both cameras see, at whatever range."""
+    return jax.device_get(
+        sight_all(arena, pose, settings.camera, NEVER_FURTHER.traced(), config.camera.image, jnp.uint32(0))
+    )
+
+
+sight_all = jax.jit(sight, static_argnames=("image",))
+
+
+def least_contrast(
+    places: Sequence[Place], eyes: StereoEyes, settings: Settings, config: MissionConfig
+) -> tuple[float, float]:
+    """Contrast at which half as much is measured as at `CONTRASTS[-1]`; and the share that is measured at none."""
+    shares = []
+    for contrast in CONTRASTS:
+        seen = []
+        for place in places[:CONTRAST_PLACES]:
+            bare = unmarked(place.arena)
+            even = replace(
+                bare,
+                boxes=replace(bare.boxes, contrast=np.full_like(bare.boxes.contrast, contrast)),
+                floor_contrast=np.float32(contrast),
+            )
+            for n in range(min(CONTRAST_VIEWS, len(place.poses))):
+                seen.append(watch_from(replace(place, arena=even), n, eyes, settings, config))
+        w = together(seen)
+        shares.append(share(w.found > 0, w.common & ~w.near & w.inner))
+    risen = np.maximum.accumulate(shares) + 1e-9 * np.arange(len(shares))
+    return float(np.interp(0.5 * risen[-1], risen, CONTRASTS)), shares[0]
+
+
+def unmarked(arena: Arena) -> Arena:
+    """An arena without landmarks, which are plain."""
+    return replace(arena, landmarks=replace(arena.landmarks, used=np.zeros_like(arena.landmarks.used)))
+
+
+def sensor_toml(fit: Fit, heading: Sequence[str]) -> str:
+    """A sensor file, with what each number means."""
+    lines = [f"# {line}" for line in heading]
+    for name in ("stereo", "landmarks"):
+        part = getattr(fit.sensor, name)
+        lines += ["", f"[{name}]"]
+        values = {field: f"{field} = {float(value)!r}" for field, value in part.model_dump().items()}
+        width = max(map(len, values.values())) + 2
+        lines += [f"{text:<{width}}# {type(part).model_fields[field].description}" for field, text in values.items()]
+    return "\n".join(lines) + "\n"

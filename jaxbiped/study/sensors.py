@@ -1,0 +1,189 @@
+"""Two sensors in the same places: how close their maps, and their missions, come to each other and to the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int8, UInt32
+
+from jaxbiped import mapping
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.mapping.truth import truth_grid
+from jaxbiped.mission.cycle import sense
+from jaxbiped.mission.eyes import Eyes
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import MissionConfig, Program, Settings, program
+from jaxbiped.mission.state import Mind, World, start
+from jaxbiped.mission.stepped import run_bare
+from jaxbiped.sensing.view import View
+from jaxbiped.study.evaluate import draw
+
+AREA = (SIZE_X, SIZE_Y)
+AWAY = (0.25, 0.80)  # [m] before what a view is aimed at
+LOW = 0.07  # [m] what is no higher, or hangs, is aimed at first
+TRIALS = 200  # places that are tried for an aimed view
+RATIO = 0.10  # by which distance and time of the same mission may differ
+
+
+@dataclass(frozen=True)
+class Place:
+    """One arena and the places that it is seen from; all on the host."""
+
+    arena: Arena
+    classes: Int8[np.ndarray, "H W"]  # the truth
+    levels: Int8[np.ndarray, "H W"]
+    seed: int  # of the noise of its missions
+    poses: tuple[Pose, ...]  # aimed at gates, bumps and obstacles in turn
+
+
+def worlds(seed: int, first: int, count: int, views: int, config: MissionConfig) -> Iterator[Place]:
+    """Arenas `first` and on of the population of `seed`, and `views` places in each; the same for all sensors."""
+    spec, body = config.grid(AREA), config.robot.body()
+    batch, seeds = draw(jax.random.key(seed), first + jnp.arange(count), FAMILIES)
+    truth = jax.jit(jax.vmap(lambda arena: truth_grid(arena, spec, body)))(batch)
+    batch, seeds, truth = jax.device_get((batch, seeds, truth))
+    for k in range(count):
+        arena, (classes, levels) = jax.tree.map(lambda leaf, k=k: leaf[k], (batch, truth))
+        rng = np.random.default_rng([seed, first + k])
+        poses = tuple(aimed(rng, arena, classes, levels, n, spec) for n in range(views))
+        yield Place(arena, classes, levels, int(seeds[k]), poses)
+
+
+def aimed(
+    rng: np.random.Generator,
+    arena: Arena,
+    classes: Int8[np.ndarray, "H W"],
+    levels: Int8[np.ndarray, "H W"],
+    number: int,
+    spec: GridSpec,
+) -> Pose:
+    """A place on the ground from which view `number` looks at a lintel or a bump, or in their want at any box."""
+    boxes = arena.boxes
+    targets = np.flatnonzero(boxes.used & (boxes.overhead | (boxes.top < LOW)))
+    others = np.flatnonzero(boxes.used)
+    targets = targets if len(targets) and number % 3 else others
+    x, y, across = spec.size_x / 2, spec.size_y / 2, 0.0
+    if len(targets):
+        x, y, across = (float(v[targets[number % len(targets)]]) for v in (boxes.x, boxes.y, boxes.yaw))
+    for trial in range(TRIALS):
+        away = rng.uniform(*AWAY)
+        sector = 0.3 if trial < TRIALS // 2 else np.pi  # else from any side
+        along = across + rng.choice([0, np.pi]) + rng.uniform(-sector, sector)
+        px, py = x - away * np.cos(along), y - away * np.sin(along)
+        i, j = int(py // spec.pitch), int(px // spec.pitch)
+        if 0.1 < px < spec.size_x - 0.1 and 0.1 < py < spec.size_y - 0.1 and classes[i, j] in (Cell.FLOOR, Cell.BUMP):
+            break
+    else:
+        (px, py), along, (i, j) = arena.start_xyyaw[:2], float(arena.start_xyyaw[2]), (0, 0)
+    yaw = along + rng.uniform(-0.2, 0.2)
+    return Pose(*(np.float32(v) for v in (px, py, levels[i, j] * spec.level_height, yaw)))
+
+
+Look = Callable[[Place, Pose, int], View]
+
+
+def looking(config: MissionConfig, eyes: Eyes | None) -> Look:
+    """What a robot sees that stands at a known place: a function of the world, the place and the number of the view."""
+    settings, static = config.settings("full"), program(config, AREA)
+    measure = eyes.see if eyes else partial(measured, program=static)
+
+    def look(world: Place, pose: Pose, number: int) -> View:
+        batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (world.arena, settings))
+        place, mind = standing(*batch, jnp.asarray(world.seed, jnp.uint32)[None], pose, jnp.int32(number), static)
+        view, _ = measure(place, mind, *batch)
+        return jax.tree.map(lambda leaf: leaf[0], view)
+
+    return look
+
+
+@partial(jax.jit, static_argnames=("program",))
+def measured(world: World, mind: Mind, arena: Arena, settings: Settings, program: Program):
+    """What a sensor that is JAX measures."""
+    return jax.vmap(partial(sense, program=program, carriage=None))(world, mind, arena, settings)
+
+
+@partial(jax.jit, static_argnames=("program",))
+def standing(
+    arena: Arena, settings: Settings, seed: UInt32[Array, "1"], pose: Pose, number: Array, program: Program
+) -> tuple[World, Mind]:
+    """A robot that stands at a pose and knows it, before its measurement of this number."""
+    world, mind = jax.vmap(start, in_axes=(0, 0, 0, None))(arena, settings, seed, program.spec)
+    pose = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], pose)
+    return replace(world, pose=pose, decisions=number[None]), replace(mind, belief=replace(mind.belief, pose=pose))
+
+
+def fused(world: Place, look: Look, config: MissionConfig) -> tuple[Int8[np.ndarray, "H W"], Int8[np.ndarray, "H W"]]:
+    """Classes and levels of the map of all views of a world, each from its known place."""
+    spec, settings = config.grid(AREA), config.settings("full")
+    grid_map = mapping.empty(spec)
+    for number, pose in enumerate(world.poses):
+        grid_map = add(grid_map, look(world, pose, number), pose, settings.body, settings.mapping, spec)
+    return jax.device_get(mapping.classify(grid_map, settings.mapping, spec))
+
+
+add = jax.jit(mapping.update, static_argnames=("spec", "refit"))
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one mission ended."""
+
+    code: Code
+    distance: float  # [m]
+    time: float  # [s]
+
+
+def mission(world: Place, config: MissionConfig, eyes: Eyes | None) -> Outcome:
+    """One mission of strategy `full` in a world."""
+    arena, settings = jax.tree.map(jnp.asarray, (world.arena, config.settings("full")))
+    end = run_bare(arena, settings, jnp.uint32(world.seed), program(config, AREA), eyes)
+    return Outcome(Code(int(end.code[0])), float(end.distance[0]), float(end.time[0]))
+
+
+def same(one: Outcome, other: Outcome) -> bool:
+    """Whether two missions ended alike: the same code, and distance and time within `RATIO`."""
+    close = (abs(a - b) <= RATIO * max(a, b) for a, b in ((one.distance, other.distance), (one.time, other.time)))
+    return one.code == other.code and all(close)
+
+
+@dataclass(frozen=True)
+class Score:
+    """Measured cells of maps against the truth."""
+
+    right: float  # share of the measured cells
+    near: float  # the same, within one cell
+    recall: dict[str, float]  # of each class, within one cell: of its true cells that were measured
+    precision: dict[str, float]  # of its cells in the maps
+
+
+def score(maps: Sequence[Int8[np.ndarray, "H W"]], truths: Sequence[Int8[np.ndarray, "H W"]]) -> Score:
+    """Of maps of the same size."""
+    called, true = np.stack(maps), np.stack(truths)
+    known = called != Cell.UNMEASURED
+    close = np.any([(called == kind) & around(true == kind) for kind in Cell], axis=0)
+    recall, precision = {}, {}
+    for kind in (Cell.FLOOR, Cell.BUMP, Cell.GATE, Cell.OBSTACLE):
+        ours, theirs = called == kind, (true == kind) & known
+        recall[kind.name.lower()] = mean(around(ours)[theirs])
+        precision[kind.name.lower()] = mean(around(true == kind)[ours])
+    return Score(mean((called == true)[known]), mean(close[known]), recall, precision)
+
+
+def around(mask: Bool[np.ndarray, "B H W"]) -> Bool[np.ndarray, "B H W"]:
+    """Cells of a mask, and their eight neighbours."""
+    _, height, width = mask.shape
+    padded = np.pad(mask, ((0, 0), (1, 1), (1, 1)))
+    return np.any([padded[:, i : i + height, j : j + width] for i in range(3) for j in range(3)], axis=0)
+
+
+def mean(values: Float[np.ndarray, "n"] | Bool[np.ndarray, "n"]) -> float:
+    """NaN of nothing."""
+    return float(np.mean(values)) if len(values) else float("nan")
