@@ -45,10 +45,11 @@ def motorcycle() -> None:
         error = (found.value - truth)[found.valid & known]
         core = error[np.abs(error) < 1]
         seen = visible_in_both(truth)
+        print(f"motorcycle, mode {modes}:")
+        print(f"  bias {core.mean():+.3f} px (median {np.median(error):+.3f}), sd {core.std():.3f} px within 1 px")
+        print(f"  {(np.abs(error) > 1).mean():.1%} of the pixels of known disparity are beyond 1 px")
         print(
-            f"motorcycle, mode {modes}: bias {core.mean():+.3f} px (median {np.median(error):+.3f}), sd {core.std():.3f} "
-            f"px within 1 px, {(np.abs(error) > 1).mean():.1%} beyond; measured {found.valid.mean():.1%} of all pixels, "
-            f"{found.valid[seen].mean():.1%} of those visible in both"
+            f"  measured {found.valid.mean():.1%} of all pixels, {found.valid[seen].mean():.1%} of those visible in both"
         )
 
 
