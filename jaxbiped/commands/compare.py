@@ -76,7 +76,8 @@ def main(args: CompareArgs) -> int:
     for sentence in report.remarks:
         console.print(sentence, highlight=False)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
-    console.print(f"{manifest.rows} missions in {spent}; written {out}", highlight=False)
+    names = ", ".join(["rows", "manifest.json", *(path.name for path in report.files)])
+    console.print(f"{manifest.rows} missions in {spent}; written {out}: {names}", highlight=False)
     return 0
 
 

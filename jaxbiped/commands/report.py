@@ -11,7 +11,11 @@ from rich.console import Console
 
 from jaxbiped.config import Model
 from jaxbiped.report.summary import write_report
+from jaxbiped.report.sweep import terminal as sweep_terminal
+from jaxbiped.report.sweep import write_sweep_report
+from jaxbiped.report.sweep_page import write_sweep_page
 from jaxbiped.report.tables import terminal
+from jaxbiped.study import read_points
 
 
 class ReportArgs(Model):
@@ -19,17 +23,23 @@ class ReportArgs(Model):
 
     folder: tyro.conf.Positional[Path]
     """A folder that `jaxbiped compare` or `jaxbiped sweep` wrote."""
-    point: Annotated[int, pydantic.Field(ge=0)] = 0
-    """Of a sweep: the sweep point that strategies are compared at."""
+    point: Annotated[int, pydantic.Field(ge=0)] | None = None
+    """Of a sweep: the point at which strategies are compared in full; by default that with the config's own values."""
     examples: Annotated[int, pydantic.Field(ge=0, le=50)] = 3
     """Arenas where the two strategies differ most, to be played again and drawn; that compiles a mission. 0: none."""
 
 
 def main(args: ReportArgs) -> int:
     """Run the command; exit status 0. InputError: no results there, or damaged ones."""
-    report = write_report(args.folder, point=args.point, examples=args.examples)
+    if len(read_points(args.folder)) > 1:
+        sweep = write_sweep_report(args.folder)
+        files = (write_sweep_page(sweep, point=args.point, examples=args.examples), *sweep.files)
+        said = sweep_terminal(sweep)
+    else:
+        report = write_report(args.folder, point=args.point or 0, examples=args.examples)
+        files, said = report.files, terminal(report.comparison)
     console = Console()
-    console.print(terminal(report.comparison))
-    names = ", ".join(str(path.relative_to(args.folder)) for path in report.files)
+    console.print(said)
+    names = ", ".join(str(path.relative_to(args.folder)) for path in files)
     console.print(f"written {args.folder}: {names}", highlight=False)
     return 0

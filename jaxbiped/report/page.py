@@ -12,7 +12,7 @@ import polars as pl
 
 from jaxbiped.report.answer import MEASURES, answer, part, verdict
 from jaxbiped.report.grid import Grid, to_grid, typeset
-from jaxbiped.report.plots import Plot, plots
+from jaxbiped.report.plots import Plot, attribution_sheet, plots
 from jaxbiped.report.tables import (
     code_sheet,
     pair_sheet,
@@ -116,8 +116,11 @@ def sections(frame: pl.DataFrame, comparison: Comparison) -> tuple[Section, ...]
         strata = tuple(to_grid(stratum_sheet(comparison, first, second, kind)) for kind in kinds)
         rates = tuple(to_grid(success_sheet(comparison, kind)) for kind in kinds)
         found.append(Section("Where it differs", grids=strata + rates))
-    codes = Section("How missions fail", plots=tuple(drawn["failures"]), grids=(to_grid(code_sheet(comparison)),))
-    return (*found, codes)
+    tables = [code_sheet(comparison)]
+    if comparison.question:
+        tables.append(attribution_sheet(frame, *comparison.question))
+    grids = tuple(to_grid(table) for table in tables)
+    return (*found, Section("How missions fail", plots=tuple(drawn["failures"]), grids=grids))
 
 
 def facts(comparison: Comparison, manifest: Manifest) -> dict[str, str]:

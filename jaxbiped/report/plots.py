@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +10,17 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from jaxbiped.report.answer import MEASURES, SUCCESS, Measure, part, verdict
-from jaxbiped.report.figures import CODE_COLOURS, canvas, difficulty, forest_row, legend_above, look, style, times
+from jaxbiped.report.figures import CODE_COLOURS, canvas, difficulty, forest_row, legend_above, look, times
 from jaxbiped.report.svg import INK, LINE, inline, themed
+from jaxbiped.report.tables import Sheet
 from jaxbiped.report.words import OPEN
-from jaxbiped.study import ALL, CODES, Comparison
+from jaxbiped.study import ALL, CODES, FAMILIES, Comparison
+from jaxbiped.study.schema import SCENE
 
 WIDTH = 5.2  # [inch]
 NO_PLAN = "#BFC6CE"
-ON_COLOUR = "#FEFEFE"  # letters on a bar: white in the dark, too
+UNPLANNED = "no plan exists"
+ON_PALE, ON_COLOUR = "#222222", "#FEFEFE"  # letters on a bar, the same in the dark
 
 
 @dataclass(frozen=True)
@@ -107,19 +111,17 @@ def forest(comparison: Comparison, first: str, second: str, measure: Measure) ->
 def attribution(frame: pl.DataFrame, comparison: Comparison) -> Figure:
     """Stacked bars, a strategy each: reached, without a plan, and how the others were lost."""
     names = comparison.strategies
-    figure = Figure(figsize=(WIDTH, 1.5 + 0.4 * len(names)), layout="constrained")
-    ax = figure.subplots()
-    style(ax, "x")
-    shares = attributed(frame, names)
+    figure, ax = canvas(WIDTH, 1.5 + 0.4 * len(names), grid="x")
     left = np.zeros(len(names))
-    for label, values in shares.items():
+    for label, counts in attributed(frame, names).items():
+        values = 100 * counts / np.maximum([comparison.summary(name).n for name in names], 1)
         if not values.any():
             continue
-        colour = NO_PLAN if label == "no plan exists" else CODE_COLOURS[label]
+        colour = NO_PLAN if label == UNPLANNED else CODE_COLOURS[label]
         ax.barh(range(len(names)), values, left=left, color=colour, label=label.replace("_", " "), height=0.66)
         for y, (value, start) in enumerate(zip(values, left, strict=True)):
             if value >= 5:
-                ink = "#222222" if label in ("reached", "no plan exists", "no_path", "out_of_steps") else ON_COLOUR
+                ink = ON_PALE if label in ("reached", UNPLANNED, "no_path", "out_of_steps") else ON_COLOUR
                 ax.text(start + value / 2, y, f"{value:.0f}", ha="center", va="center", color=ink, fontsize=8)
         left += values
     ax.set_yticks(range(len(names)), names)
@@ -131,13 +133,27 @@ def attribution(frame: pl.DataFrame, comparison: Comparison) -> Figure:
     return figure
 
 
-def attributed(frame: pl.DataFrame, names: tuple[str, ...]) -> dict[str, np.ndarray]:
-    """Shares [%] of missions by what became of them, a value for each strategy."""
-    lost = pl.col("strategy").is_not_null() & ~pl.col("success")
-    wheres = {"reached": pl.col("success"), "no plan exists": lost & ~pl.col("reachable")}
-    wheres |= {code: lost & pl.col("reachable") & (pl.col("code") == code) for code in CODES[1:]}
+def attributed(frame: pl.DataFrame, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Missions by what became of them, a count for each strategy: together they are all."""
+    wheres = {"reached": pl.col("success"), UNPLANNED: ~pl.col("success") & ~pl.col("reachable")}
+    wheres |= {code: pl.col("reachable") & (pl.col("code") == code) for code in CODES[1:]}
     sides = [frame.filter(pl.col("strategy") == name) for name in names]
-    return {
-        label: np.array([100 * side.select(where.sum()).item() / max(len(side), 1) for side in sides])
-        for label, where in wheres.items()
-    }
+    return {label: np.array([side.select(where.sum()).item() for side in sides]) for label, where in wheres.items()}
+
+
+def attribution_sheet(frame: pl.DataFrame, first: str, second: str) -> Sheet:
+    """The same for two strategies, family by family."""
+    parts = [(family, frame.filter(pl.col("family") == family)) for family in (*FAMILIES, SCENE)]
+    counts = {family: attributed(rows, (first, second)) for family, rows in parts if len(rows)}
+    seen = [label for label in ("reached", UNPLANNED, *CODES[1:]) if any(item[label].any() for item in counts.values())]
+    groups = tuple(
+        (
+            (name, *[""] * len(seen)),
+            *((family, *(str(item[label][k]) for label in seen)) for family, item in counts.items()),
+        )
+        for k, name in enumerate((first, second))
+    )
+    notes = (f"Counts. “{UNPLANNED.capitalize()}”: none for this strategy with perfect knowledge, however it ended.",)
+    return Sheet(
+        "What became of missions, by family", ("family", *(label.replace("_", " ") for label in seen)), groups, notes
+    )

@@ -180,7 +180,8 @@ def short_stratum_sheet(comparison: Comparison, first: str, second: str, kind: s
             limits = brackets(estimate, measure.scale, digits)
             star = "*" if p is not None and p < ALPHA else " "
             cells.append((value if limits == NONE else f"{value} {limits}") + star)
-        rows.append((stratum.name, str(pair.success.n), cells[0], str(pair.time.n), *cells[1:]))
+        name = stratum.name.replace(" to ", "–")  # as narrow as a family's
+        rows.append((name, str(pair.success.n), cells[0], str(pair.time.n), *cells[1:]))
     columns = (kind, "arenas", "success, points", "both", "distance, cm", "time, min")
     notes = (f"Mean differences, first minus second, with intervals. *: p < {ALPHA:g} after Holm's correction.",)
     return Sheet(f"{first} - {second} by {kind}", columns, (tuple(rows[:1]), tuple(rows[1:])), notes)

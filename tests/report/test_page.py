@@ -5,9 +5,12 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
+import polars as pl
 import pytest
 
 from jaxbiped.report.grid import parsed, to_grid, typeset
+from jaxbiped.report.plots import attributed, attribution_sheet
 from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import Sheet
 from jaxbiped.study import create
@@ -63,7 +66,7 @@ def test_it_says_what_was_asked_answered_and_done(read):
 
 
 def test_tables_are_complete(read):
-    assert len(read.tables) == 7
+    assert len(read.tables) == 8
     for table in read.tables:
         widths = {sum(span for span, _ in row) for row in table}
         assert len(table) > 1 and len(widths) == 1
@@ -76,6 +79,21 @@ def test_figures_are_there_with_words_for_who_does_not_see_them(read):
     figures = [found for tag, found in read.elements if tag == "svg" and found.get("role") == "img"]
     assert len(figures) == 7 and all(found["aria-label"] for found in figures)
     assert sum(tag == "figcaption" for tag, _ in read.elements) == len(figures)
+
+
+def test_every_mission_is_attributed_once():
+    frame = rows(120)
+    names = ("full", "floor_only")
+    counts = attributed(frame, names)
+    assert sum(counts.values()).tolist() == [120, 120]
+    reached = frame.filter(pl.col("success"))["strategy"].value_counts()
+    assert counts["reached"].tolist() == [dict(reached.iter_rows())[name] for name in names]
+    full = frame.filter((pl.col("strategy") == "full") & ~pl.col("success"))
+    assert counts["no plan exists"][0] == full["reachable"].not_().sum() > 0
+    assert counts["fell"][0] == ((full["code"] == "fell") & full["reachable"]).sum()
+    sheet = attribution_sheet(frame, *names)
+    counted = np.array([[int(cell) for cell in row[1:]] for group in sheet.groups for row in group[1:]])
+    assert counted.sum() == 240 and len(counted) == 12
 
 
 def test_points_stand_under_each_other():
@@ -118,4 +136,4 @@ def test_a_browser_shows_it_without_scrolling_sideways(page, tmp_path):
     for width, measured in zip(WIDTHS, found.group(1).split(";"), strict=True):
         across, inner, right, figures, narrowest, tables = (float(value) for value in measured.split())
         assert across <= inner <= width and right <= inner + 0.5, (width, measured)
-        assert figures == 7 and narrowest >= 300 and tables == 7, (width, measured)
+        assert figures == 7 and narrowest >= 300 and tables == 8, (width, measured)

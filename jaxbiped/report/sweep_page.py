@@ -1,0 +1,159 @@
+"""The HTML page of a sweep: what changes over its points, then the strategies at one of them."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import replace
+from pathlib import Path
+
+import polars as pl
+from matplotlib.figure import Figure
+
+from jaxbiped.errors import InputError
+from jaxbiped.files import write_whole
+from jaxbiped.report.answer import listed
+from jaxbiped.report.figures import INK, canvas, error_bars, legend_above, look
+from jaxbiped.report.grid import to_grid, typeset
+from jaxbiped.report.page import PAGE, Section, page_of, render
+from jaxbiped.report.plots import WIDTH, Plot
+from jaxbiped.report.summary import LIMITATIONS, looked_at
+from jaxbiped.report.svg import inline, themed
+from jaxbiped.report.sweep import LIMITATIONS as OF_SWEEPS
+from jaxbiped.report.sweep import SweepReport, grid_axes
+from jaxbiped.report.sweep_figures import Panel, difference_panels, dots, heat_map, rate_panels, scale_x
+from jaxbiped.study import compare, read
+from jaxbiped.study.pointwise import PointResult, SweepResult
+
+MOST_ROWS = 256  # of a table: beyond, the page says where the others are
+
+
+def write_sweep_page(
+    report: SweepReport, *, point: int | None = None, resamples: int = 4999, examples: int = 0
+) -> Path:
+    """Write `report.html` into a sweep's folder.
+
+    Args:
+      report: of the sweep.
+      point: at which strategies are compared in full; by default that with the config's own values, else the first.
+      resamples: of the bootstraps at that point.
+      examples: arenas to be played again and drawn there, see `summary.write_report`.
+
+    Raises:
+      InputError: a point that has no rows, or a file that cannot be written.
+    """
+    result, manifest, folder = report.result, report.manifest, report.folder
+    if point is None:
+        point = result.points[0].index if result.reference is None else result.reference
+    chosen = next((item for item in result.points if item.index == point), None)
+    if chosen is None:
+        allowed = f"must be a sweep point with rows, {result.points[0].index} to {result.points[-1].index}"
+        raise InputError(allowed, file=folder, field="point", value=point)
+    frame = read(folder)[0].filter(pl.col("point") == point)
+    comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
+    page = page_of(
+        frame,
+        comparison,
+        manifest,
+        title=title(report),
+        limitations=tuple(dict.fromkeys((*OF_SWEEPS, *LIMITATIONS))),
+        commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
+        more=looked_at(folder, frame, comparison, manifest, examples),
+    )
+    kicker = f"jaxbiped · {len(result.points):,} sweep points · {page.kicker.partition(' · ')[2]}"
+    at = f"At point {point}: {listed([f'{name} {value:g}' for name, value in chosen.values.items()])}"
+    text = "From here on all is about this one point; the option --point of jaxbiped report chooses another."
+    page = replace(
+        page,
+        kicker=kicker,
+        answer=tuple(typeset(sentence) for sentence in report.sentences),
+        keys=(),
+        sections=(over(report), Section(at, (text,)), *page.sections),
+        warnings=() if manifest.state == "finished" else ("This sweep is not finished: points lack arenas.",),
+    )
+    path = folder / PAGE
+    write_whole(path, lambda file: file.write(render(page).encode()))
+    return path
+
+
+def title(report: SweepReport) -> str:
+    """The sweep's own question, or what it asks by its axes."""
+    asked = report.manifest.config.get("question")
+    if asked:
+        return asked
+    what = listed(report.result.fields)
+    if report.result.question is None:
+        return f"How does {report.result.strategies[0]} fare against {what}?"
+    first, second = report.result.question
+    return f"How does the difference between {first} and {second} depend on {what}?"
+
+
+def over(report: SweepReport) -> Section:
+    """Figures and tables over all points."""
+    grids = []
+    for sheet in report.sheets:
+        (rows,) = sheet.groups
+        notes = sheet.notes
+        if len(rows) > MOST_ROWS:
+            notes = (*notes, f"The first {MOST_ROWS} of {len(rows):,} points; summary.md has them all.")
+        grids.append(to_grid(replace(sheet, groups=(rows[:MOST_ROWS],), notes=notes)))
+    with themed():
+        plots = sweep_plots(report.result, grid_axes(report.manifest))
+    return Section("Over the sweep", plots=plots, grids=tuple(grids))
+
+
+def sweep_plots(result: SweepResult, axes: tuple[str, ...]) -> tuple[Plot, ...]:
+    """A line for each quantity over one axis, a heat map over two, else dots over each field."""
+    panels = difference_panels(result)
+    drawn: list[tuple[str, Figure, str]] = []
+    level = f"with intervals at {100 * result.level:g} %"
+    if len(axes) == 1:
+        drawn.append(("sweep-rates", rate_lines(result, axes[0]), f"Success of each strategy, {level}."))
+        for k, panel in enumerate(panels):
+            drawn.append((f"sweep-{k}", difference_line(result, axes[0], panel), f"{plain(panel)}, {level}."))
+    elif len(axes) == 2:
+        for k, panel in enumerate((*panels, *rate_panels(result))):
+            caption = f"{plain(panel)}."
+            if panel.signed:
+                caption += f" Blue: {result.question[0]} is better. Framed: the interval leaves zero out."
+            drawn.append((f"sweep-{k}", heat_map(result, *axes, panels=(panel,)), caption))
+    else:
+        for k, field in enumerate(result.fields):
+            one = replace(result, points=tuple(only(point, field) for point in result.points))
+            drawn.append((f"sweep-{k}", dots(one), f"Each dot is a sweep point, drawn over {field}."))
+    return tuple(Plot(inline(figure, name, caption), caption) for name, figure, caption in drawn)
+
+
+def plain(panel: Panel) -> str:
+    """A panel's title in a sentence."""
+    return panel.title.replace("\n", " ").replace(" [%]", ", in %")
+
+
+def only(point: PointResult, field: str) -> PointResult:
+    """A point as if one field were swept alone."""
+    return replace(point, values={field: point.values[field]})
+
+
+def rate_lines(result: SweepResult, field: str) -> Figure:
+    """Success of each strategy against one field."""
+    figure, ax = canvas(WIDTH, 3.4)
+    for name in result.strategies:
+        found = [(point.values[field], point.success[name]) for point in result.points if name in point.success]
+        error_bars(ax, found, name, look(name, result.strategies), 100.0, line=True)
+    scale_x(ax, [point.values[field] for point in result.points])
+    ax.set_xlabel(field)
+    ax.set_ylabel("reached the goal [%]")
+    legend_above(figure, ax, columns=3)
+    return figure
+
+
+def difference_line(result: SweepResult, field: str, panel: Panel) -> Figure:
+    """One measure of the question's pair against one field."""
+    figure, ax = canvas(WIDTH, 3.4)
+    ax.axhline(0, color=INK, lw=1)
+    found = [(point.values[field], panel.of(point)) for point in result.points]
+    found = [(x, value) for x, value in found if value and value.valid and value.low is not None]
+    error_bars(ax, found, "", ("#0072B2", "o"), panel.scale, line=True)
+    scale_x(ax, [point.values[field] for point in result.points])
+    ax.set_xlabel(field)
+    ax.set_title(panel.title)
+    return figure
