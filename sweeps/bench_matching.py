@@ -48,9 +48,8 @@ def motorcycle() -> None:
         print(f"motorcycle, mode {modes}:")
         print(f"  bias {core.mean():+.3f} px (median {np.median(error):+.3f}), sd {core.std():.3f} px within 1 px")
         print(f"  {(np.abs(error) > 1).mean():.1%} of the pixels of known disparity are beyond 1 px")
-        print(
-            f"  measured {found.valid.mean():.1%} of all pixels, {found.valid[seen].mean():.1%} of those visible in both"
-        )
+        twice = found.valid[seen].mean()
+        print(f"  measured {found.valid.mean():.1%} of all pixels, {twice:.1%} of those visible in both")
 
 
 def visible_in_both(truth: np.ndarray) -> np.ndarray:
