@@ -9,13 +9,14 @@ from rich.console import Console
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
-from jaxbiped.files import refuse_existing
 from jaxbiped.mission.settings import SIMULATED
 from jaxbiped.report.sweep import terminal, write_sweep_report
+from jaxbiped.report.sweep_page import write_sweep_page
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.evaluate import WORKERS
 from jaxbiped.study.groups import group_points
 from jaxbiped.study.memory import check_memory
+from jaxbiped.study.resume import refuse_taken
 from jaxbiped.study.sweep import SweepConfig
 
 
@@ -57,7 +58,7 @@ def main(args: SweepArgs) -> int:
             rehearse(point.mission)
     out = args.out or Path("results") / f"sweep-{config_hash(config)}"
     if not args.resume:
-        refuse_existing(out)
+        refuse_taken(out)
     console = Console()
     programs = f"{len(groups)} compiled program{'s' * (len(groups) > 1)}"
     what = f"{len(points)} sweep points in {programs}, {config.arenas} arenas each, seed {config.seed}"
@@ -67,6 +68,7 @@ def main(args: SweepArgs) -> int:
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
     report = write_sweep_report(out)
     console.print(terminal(report))
-    names = ", ".join(["rows", "points.parquet", "manifest.json", *(path.name for path in report.files)])
+    files = (write_sweep_page(report), *report.files)
+    names = ", ".join(["rows", "points.parquet", "manifest.json", *(path.name for path in files)])
     console.print(f"{manifest.rows} missions in {spent}; written {out}: {names}", highlight=False)
     return 0
