@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,6 +13,7 @@ import pydantic
 from jaxtyping import Array, Float, Int
 
 from jaxbiped.config import Model
+from jaxbiped.errors import InputError
 from jaxbiped.mapping import Body, GridSpec, MapConfig, MapParams
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.library import Library, load_library
@@ -23,7 +25,7 @@ from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
 from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
 from jaxbiped.sensing.noise import NoiseConfig, StereoNoise
 from jaxbiped.sensing.odometry import OdometryConfig, OdometryNoise
-from jaxbiped.sensing.presets import PRESETS
+from jaxbiped.sensing.presets import PRESETS, sensor_preset
 
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
@@ -49,6 +51,10 @@ class CostConfig(Model):
     c4: Cost = 100.0
     """Into what is unmeasured."""
 
+    def traced(self) -> Costs:
+        """The same as arrays."""
+        return Costs(**{name: jnp.float32(value) for name, value in self.model_dump().items()})
+
 
 class LimitConfig(Model):
     """When a mission ends."""
@@ -70,8 +76,9 @@ class MissionConfig(Model):
 
     sensor: Literal["raycast", "oracle", "stereo"] = "raycast"
     """`stereo`: pairs of pictures, rendered and matched on the host."""
-    preset: Literal["ideal", "rendered", "real"] = "rendered"
-    """How well the camera measures: the default of each number of `stereo` and `landmarks`."""
+    preset: str = "rendered"
+    """How well the camera measures, the default of each number of `stereo` and `landmarks`: ideal, rendered, real, or a
+    sensor file (.toml), as `jaxbiped fit-sensor` writes it."""
     executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
     """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
     MuJoCo's own batch or in MJX."""
@@ -99,14 +106,23 @@ class MissionConfig(Model):
         if isinstance(data, dict) and data.get("executor", "kinematic") != "kinematic":
             robot = data.get("robot", {})
             data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
-        preset = PRESETS.get(data.get("preset", "rendered")) if isinstance(data, dict) else None
-        if preset is None:
-            return data
+        try:
+            preset = sensor_preset(data.get("preset", "rendered"))
+        except (InputError, AttributeError, TypeError):
+            return data  # what is wrong is said of the field itself
         filled = {}
         for name in ("stereo", "landmarks"):
             given = data.get(name, {})
             filled[name] = getattr(preset, name).model_dump() | given if isinstance(given, dict) else given
         return data | filled
+
+    @pydantic.field_validator("preset")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        if name not in PRESETS and not name.endswith(".toml"):
+            raise ValueError(f"must be one of {', '.join(PRESETS)} or a .toml file")
+        sensor_preset(name)
+        return name
 
     def grid(self, size_xy: tuple[float, float]) -> GridSpec:
         """The static grid of an area [m]; InputError when the pitch does not divide it."""
@@ -118,16 +134,16 @@ class MissionConfig(Model):
         sd, sd_yaw = limits.start_sd
         return Settings(
             strategy=strategy(strategy_name, self.corner_cutting),
-            costs=Costs(**{name: jnp.float32(value) for name, value in self.costs.model_dump().items()}),
-            durations=self.durations.traced(),
-            body=self.robot.body(),
-            camera=self.camera.traced(),
-            stereo=self.stereo.traced(),
-            landmarks=self.landmarks.traced(),
-            odometry=self.odometry.traced(),
-            mapping=self.mapping.params(),
-            library=load_library(self.library).traced(),
-            footing=self.robot.footing.traced(),
+            costs=numbers(self.costs),
+            durations=numbers(self.durations),
+            body=numbers(self.robot, "body"),
+            camera=numbers(self.camera),
+            stereo=numbers(self.stereo),
+            landmarks=numbers(self.landmarks),
+            odometry=numbers(self.odometry),
+            mapping=numbers(self.mapping, "params"),
+            library=library_numbers(self.library),
+            footing=numbers(self.robot.footing),
             limits=Limits(
                 goal_radius=jnp.float32(limits.goal_radius),
                 max_decisions=jnp.int32(limits.max_decisions),
@@ -138,6 +154,18 @@ class MissionConfig(Model):
                 start_variance=jnp.array([sd**2, sd**2, sd_yaw**2], jnp.float32),
             ),
         )
+
+
+@functools.lru_cache(maxsize=256)
+def numbers(config: Model, form: str = "traced"):
+    """The traced form of a part of a config, made once for all the points of a sweep that share the part."""
+    return getattr(config, form)()
+
+
+@functools.lru_cache(maxsize=8)
+def library_numbers(path: Path | None) -> Library:
+    """The same of a library file."""
+    return load_library(path).traced()
 
 
 @jax.tree_util.register_dataclass

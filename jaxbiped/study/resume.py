@@ -10,6 +10,7 @@ import polars as pl
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
+from jaxbiped.files import refuse_existing
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
 from jaxbiped.study.schema import validate
@@ -57,6 +58,14 @@ def resume(
         lock.release()
         raise
     return store
+
+
+def refuse_taken(folder: Path) -> None:
+    """Raise `InputError` when a new study cannot be written there, with what to do about one that was stopped."""
+    if (folder / MANIFEST).exists() and read_manifest(folder).state != "finished":
+        message = "holds a study that is not finished: --resume goes on with it"
+        raise InputError(message, field="out", value=str(folder))
+    refuse_existing(folder)
 
 
 def begun(folder: Path) -> bool:

@@ -19,6 +19,7 @@ from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.study import store
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.lock import FolderLock
+from jaxbiped.study.resume import refuse_taken
 from tests.study.engine import CONFIG, TABLE, engine
 
 conduct_here = partial(conduct, config=CONFIG, engine=engine)
@@ -129,6 +130,14 @@ def test_another_folder_is_not_taken_up(tmp_path):
 def test_without_resume_a_stopped_study_is_refused(stopped):
     with pytest.raises(InputError, match="must be new or empty"):
         conduct_here(stopped)
+
+
+def test_a_new_study_where_one_was_stopped_is_told_to_resume(stopped, whole, tmp_path):
+    with pytest.raises(InputError, match=r"out: holds a study that is not finished: --resume goes on with it"):
+        refuse_taken(stopped)
+    with pytest.raises(InputError, match="must be a folder that does not exist yet"):
+        refuse_taken(whole)
+    refuse_taken(tmp_path / "new")
 
 
 def test_finished_study_is_refused(whole):
