@@ -14,9 +14,8 @@ from pydantic import Field
 from jaxbiped.config import Model
 from jaxbiped.files import write_whole
 from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.chart import PIXELS, SCAN, Chart, lay_out, make_chart
+from jaxbiped.mapping.chart import SCAN, Chart, ChartConfig, lay_out, make_chart
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mapping.params import MapConfig
 from jaxbiped.motion.robot import RobotConfig
 
 Metres = Annotated[float, Field(ge=-1e9, le=1e9)]
@@ -33,8 +32,8 @@ class ChartArgs(Model):
     """[m] What to map. Default: what the points cover."""
     robot: RobotConfig = RobotConfig()
     """The robot that the map is for."""
-    map: MapConfig = SCAN
-    """Thresholds of the map, in pixels; 1 cm2 of surface counts as 8."""
+    map: ChartConfig = SCAN
+    """Thresholds of the map."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     """Of the search for the floor."""
     out: Folder = None
@@ -79,7 +78,7 @@ def write_chart(
         "lowest": spec.lowest,
     }
     write_whole(folder / "voxels.npz", lambda file: np.savez_compressed(file, **arrays))
-    occupied = made.surface * PIXELS >= max(args.map.voxel_points * spec.cell_share, PIXELS)
+    occupied = made.surface >= max(args.map.voxel * spec.cell_share, 1.0)
     measured.save_voxels(folder / "voxels.png", occupied, spec.pitch, spec.level_height, spec.lowest, title=title)
     measured.save_classes(folder / "map.png", made.grid, title=title, camera_xy=camera_xy)
     return ["classes.npz", "voxels.npz", "voxels.png", "map.png"]

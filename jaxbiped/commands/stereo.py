@@ -15,9 +15,8 @@ from jaxbiped.commands.charting import ChartArgs, chart, say_map, write_chart, w
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
-from jaxbiped.mapping.chart import ONE_LOOK
+from jaxbiped.mapping.chart import ONE_LOOK, ChartConfig
 from jaxbiped.mapping.floor import Floor, find_floor
-from jaxbiped.mapping.params import MapConfig
 from jaxbiped.sensing.cloud import save_ply
 from jaxbiped.sensing.stereo.calibration_files import load_rig
 from jaxbiped.sensing.stereo.images import as_rgb, load_pair
@@ -46,8 +45,8 @@ class StereoArgs(ChartArgs):
     """[px] Search range. Default: the camera file's, else --match's."""
     match: MatchParams = MatchParams()
     """Numbers of the matcher."""
-    map: MapConfig = ONE_LOOK
-    """Thresholds of the map, in pixels; 1 cm2 of surface counts as 8."""
+    map: ChartConfig = ONE_LOOK
+    """Thresholds of the map."""
 
 
 def main(args: StereoArgs) -> int:

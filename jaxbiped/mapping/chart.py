@@ -3,31 +3,57 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Float32, Int64
+from pydantic import Field
 
+from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import MOST_CELLS, Body, Cell, GridSpec
 from jaxbiped.mapping.gridmap import classify, empty, update
-from jaxbiped.mapping.params import MapConfig
+from jaxbiped.mapping.params import MapParams
 from jaxbiped.sensing.view import View
 
 AT_ONCE = 1_000_000  # points that are put into voxels at a time: memory stays bounded
 MOST_WAITING = 16_000_000  # cubes that are remembered before those seen twice are struck out
 CUBE = 0.01  # [m] points of one cube this wide count once
-PIXELS = 8.0  # pixels that 1 cm2 of surface is worth, in the thresholds of `MapConfig`
 COVERED = 12.5  # [cm2] of 5 x 5 cm that a scan is taken to cover; sparser ones count for more
 
 
-ONE_LOOK, SCAN = MapConfig(solid_points=100.0), MapConfig(solid_points=50.0)
-"""Thresholds for surfaces: of one stereo pair, whose phantoms must not bar the way, and of a scan, which has none.
+class ChartConfig(Model):
+    """Thresholds on the surface that points cover, as those of `MapConfig` on numbers of pixels.
+
+    They are stated for cells of 5 x 5 cm, and scale with the cell's area (`solid` belongs to a patch of fixed size).
+    """
+
+    voxel: float = Field(0.25, ge=0)
+    """[cm2] a voxel with less is empty"""
+    voxel_share: float = Field(0.05, ge=0, lt=1)
+    """a voxel with a smaller share of the surface of one right above or below is empty: noise leaked out of that one"""
+    solid: float = Field(6.0, ge=0)
+    """[cm2] a patch of 5 x 5 cm of one level with less bars no way: it may be a phantom; a face of a wall has 15"""
+    cell: float = Field(1.25, gt=0)
+    """[cm2] a cell with less is unmeasured"""
+    head_margin: float = Field(0.0, ge=0)
+    """[m] how far a voxel may reach below the squatting head before it blocks"""
+
+    def params(self) -> MapParams:
+        """These thresholds for `mapping.update`, to which a point then weighs what it covers."""
+        named = {"voxel_points": self.voxel, "voxel_share": self.voxel_share, "solid_points": self.solid}
+        named |= {"fused_points": self.cell, "head_margin": self.head_margin, "max_range": math.inf}
+        unused = ("view_points", "refit_slope", "refit_offset", "refit_inlier", "refit_points")
+        return MapParams(**{name: jnp.float32(value) for name, value in (named | dict.fromkeys(unused, 0.0)).items()})
+
+
+ONE_LOOK, SCAN = ChartConfig(solid=12.5), ChartConfig()
+"""For one stereo pair, whose phantoms must not bar the way, and for a scan, which has none.
 
 By rendered pairs of 36 random arenas, and by clouds sampled from 12 at densities of 4 to 70 points a cell.
 """
@@ -134,7 +160,7 @@ def make_chart(
     spec: GridSpec,
     origin_xy: tuple[float, float],
     body: Body,
-    config: MapConfig,
+    config: ChartConfig,
     *,
     sparse: bool = False,
 ) -> Chart:
@@ -149,14 +175,14 @@ def make_chart(
       points: [m] z up, the floor at 0; any number of them, finite or not.
       spec, origin_xy: the grid (`lay_out`).
       body: the robot that it is read for.
-      config: thresholds; `max_range` is not looked at. `ONE_LOOK` and `SCAN` are made for this.
+      config: thresholds: `ONE_LOOK`, `SCAN`, or others.
       sparse: count surfaces for more where the cloud is so sparse that it covers less than half of a typical cell.
     """
     surface = cover_voxels(points, spec, origin_xy)
-    evidence = surface * PIXELS
+    evidence = surface
     if sparse and surface.any():
         best = surface.max(-1)
-        evidence *= max(COVERED * spec.cell_share / float(np.median(best[best > 0])), 1.0)
+        evidence = evidence * max(COVERED * spec.cell_share / float(np.median(best[best > 0])), 1.0)
     i, j, k = np.nonzero(evidence)
     slots = 1 << max(len(i) - 1, 1).bit_length()  # powers of two, so that few sizes are ever compiled
     padded = np.zeros((4, slots), np.float32)
@@ -166,10 +192,9 @@ def make_chart(
         (k + spec.lowest) * spec.level_height,
         evidence[i, j, k],
     )
-    params = replace(config.params(), max_range=jnp.float32(math.inf))
-    classes, levels = (np.array(values) for values in read(View(*padded), body, params, spec=spec))
+    classes, levels = (np.array(values) for values in read(View(*padded), body, config.params(), spec=spec))
     ground = evidence[..., : spec.ground_levels - spec.lowest].sum(-1)
-    unseen = (ground < config.voxel_points * spec.cell_share) & (classes != Cell.OBSTACLE)
+    unseen = (ground < config.voxel * spec.cell_share) & (classes != Cell.OBSTACLE)
     classes[unseen], levels[unseen] = Cell.UNMEASURED, 0
     grid = ClassGrid(classes, levels, np.array(origin_xy, np.float64), spec.pitch)
     return Chart(grid, surface, spec)
