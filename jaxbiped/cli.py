@@ -82,7 +82,7 @@ def dispatch(name: str, rest: list[str]) -> int:
         # They decide the defaults of other options, so that they must be known before those are read.
         if "mission" in options.model_fields and f"--{option}" in rest[:-1]:
             value, known = rest[rest.index(f"--{option}") + 1], options.model_fields["mission"].annotation.model_fields
-            if value in get_args(known[option].annotation):
+            if value in (get_args(known[option].annotation) or [value]):
                 data = data | {"mission": data.get("mission", {}) | {option: value}}
     if data or path:
         required = {name for name, field in options.model_fields.items() if field.is_required()}

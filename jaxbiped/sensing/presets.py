@@ -36,5 +36,5 @@ def sensor_preset(name: str) -> SensorConfig:
     if name in PRESETS:
         return PRESETS[name]
     if Path(name).suffix != ".toml":
-        raise InputError(f"must be one of {', '.join(PRESETS)} or a .toml file", field="sensor", value=name)
+        raise InputError(f"must be one of {', '.join(PRESETS)} or a .toml file", field="preset", value=name)
     return config.load(SensorConfig, name)

@@ -178,3 +178,13 @@ def test_usage(capsys):
     assert cli.main(["--help"]) == 0 and "compare" in capsys.readouterr().out
     assert cli.main([]) == 2
     assert cli.main(["--version"]) == 0
+
+
+def test_a_sensor_file_is_a_preset(here, parsed, capsys):
+    (here / "mine.toml").write_text("[stereo]\nsd = 0.3\n[landmarks]\nsd = 0.001\n")
+    mine = parsed("--preset", "mine.toml", "--stereo.bias", "0.2")
+    assert (mine.stereo.sd, mine.stereo.bias, mine.landmarks.sd) == (0.3, 0.2, 0.001)
+    assert mine.stereo.edge_swap == PRESETS["rendered"].stereo.edge_swap
+    line = refused(capsys, "run", SCENE, "--preset", "best")
+    assert "preset" in line and "ideal, rendered, real or a .toml file" in line and line.count("best") == 1
+    assert "no such file" in refused(capsys, "run", SCENE, "--preset", "nowhere.toml")

@@ -46,8 +46,8 @@ def arena_model(arena: Arena) -> mujoco.MjModel:
     light = spec.worldbody.add_light(type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, dir=SUN, castshadow=False)
     light.ambient, light.diffuse, light.specular = (AMBIENT,) * 3, (DIFFUSE,) * 3, (0.0,) * 3
     spec.add_texture(
-        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT, rgb1=SKY, rgb2=SKY,
-        width=16, height=16,
+        name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
+        rgb1=SKY, rgb2=SKY, width=16, height=16,
     )  # fmt: skip
     half = arena.size_xy.astype(float) / 2
     middle = np.array([half[0], half[1], -FLOOR_DEPTH / 2])
