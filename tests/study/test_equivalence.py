@@ -29,19 +29,19 @@ def test_each_stratum_is_its_own_test_and_corrected_among_its_kind():
 
 
 def test_the_interval_lies_within_the_margin_exactly_where_it_is_shown():
-    for margin in (0.02, 0.1, 0.3, 0.6):
-        (found, *_) = equivalences(FRAME, *PAIR, {"success": margin})
+    for margin in (0.1, 0.6):
+        (found, *_) = equivalences(FRAME.head(300), *PAIR, {"success": margin})
         inside = -margin < found.difference.low and found.difference.high < margin
         assert found.shown == inside
 
 
 def test_two_that_differ_by_the_margin_are_called_equivalent_no_more_often_than_stated():
-    # At the very margin the error rate is greatest; 800 studies of 200 arenas, four standard errors.
-    rng, limit = np.random.default_rng(2), 0.05 + 4 * np.sqrt(0.05 * 0.95 / 800)
-    counts = rng.multinomial(200, [0.2, 0.1, 0.7], size=800)
+    # At the very margin the error rate is greatest; 400 studies of 200 arenas, four standard errors.
+    rng, limit = np.random.default_rng(2), 0.05 + 4 * np.sqrt(0.05 * 0.95 / 400)
+    counts = rng.multinomial(200, [0.2, 0.1, 0.7], size=400)
     wrong = np.mean([equivalent_success(int(a), int(b), 200, 0.1).p < 0.05 for a, b, _ in counts])
     assert wrong <= limit
-    samples = rng.normal(30.0, 60.0, (800, 50))
+    samples = rng.normal(30.0, 60.0, (400, 50))
     assert np.mean([equivalent_mean(sample, 30.0).p < 0.05 for sample in samples]) <= limit
     assert np.mean([equivalent_mean(sample - 30.0, 30.0).p < 0.05 for sample in samples]) > 0.9
 

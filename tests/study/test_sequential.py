@@ -19,7 +19,7 @@ from jaxbiped.study.sequential import (
 )
 from tests.study.synthetic import rows
 
-RUNS, LOOKS, SHARD = 300, 30, 60
+RUNS, LOOKS, SHARD = 200, 30, 60
 GOALS = {
     name: Goal(name, "full", "floor_only", width)
     for name, width in (("success", 0.05), ("distance", 0.1), ("time", 20.0))
