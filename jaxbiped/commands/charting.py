@@ -19,7 +19,7 @@ from jaxbiped.mapping.grid import Cell
 from jaxbiped.motion.robot import RobotConfig
 
 Metres = Annotated[float, Field(ge=-1e9, le=1e9)]
-Area = Annotated[tuple[Metres, Metres, Metres, Metres] | None, tyro.conf.arg(metavar="X0 X1 Y0 Y1")]
+Area = Annotated[tuple[float, float, float, float] | None, tyro.conf.arg(metavar="X0 X1 Y0 Y1")]
 Folder = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
 
 

@@ -19,14 +19,13 @@ from jaxbiped.mapping.upright import FRAMES, Upright, find_upright, set_upright
 from jaxbiped.sensing import cloud as clouds
 from jaxbiped.sensing.cloud import Cloud
 
-Component = Annotated[float, Field(ge=-1e6, le=1e6)]
-Vector = Annotated[tuple[Component, Component, Component] | None, tyro.conf.arg(metavar="X Y Z")]
+Vector = Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")]
 
 
 class ClassifyArgs(ChartArgs):
     """Map a point cloud: 3D grid and class grid, with pictures."""
 
-    cloud: tyro.conf.Positional[Path]
+    cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="CLOUD")]
     """The cloud, .npz (points [N, 3], or x, y, z), .npy, .ply or .pcd."""
     scale: Annotated[float, Field(gt=0, le=1e4)] = 1.0
     """[m] One unit of the cloud; 0.001 for millimetres."""
@@ -85,8 +84,8 @@ def check_options(args: ClassifyArgs) -> None:
     """Raise `InputError` unless the options go together."""
     if args.floor is not None and args.up is None:
         raise InputError("goes with --up only", field="floor", value=args.floor)
-    if args.up is not None and not math.hypot(*args.up) > 0:
-        raise InputError("must not be 0 0 0", field="up", value=args.up)
+    if args.up is not None and not 0 < math.hypot(*args.up) < math.inf:
+        raise InputError("must be a direction, not 0 0 0", field="up", value=args.up)
 
 
 def stand(cloud: Cloud, args: ClassifyArgs) -> Upright:

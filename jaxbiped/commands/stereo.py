@@ -33,9 +33,9 @@ HEIGHT_OFF = 0.15  # of the height of the camera file, or 5 cm, that the floor m
 class StereoArgs(ChartArgs):
     """Map what a stereo pair shows: points, 3D grid and class grid, with pictures."""
 
-    left: tyro.conf.Positional[Path]
+    left: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LEFT")]
     """The picture of the left camera: PNG, JPEG, TIFF, PGM, ...; grey or colour, 8 or 16 bits."""
-    right: tyro.conf.Positional[Path]
+    right: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RIGHT")]
     """That of the right camera."""
     camera: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """Calibration: .toml, OpenCV's .yaml or .xml, or Middlebury's calib.txt."""

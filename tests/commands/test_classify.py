@@ -138,7 +138,7 @@ def test_what_is_refused(tmp_path):
     assert "give --up X Y Z, and --floor where the floor is not in it" in text
     assert refused(tmp_path, np.zeros((0, 3))).endswith("cloud.npz: must hold finite points; it has none")
     assert refused(tmp_path, floor=0.1) == "floor: goes with --up only (got 0.1)"
-    assert refused(tmp_path, up=(0.0, 0.0, 0.0)).startswith("up: must not be 0 0 0")
+    assert refused(tmp_path, up=(0.0, 0.0, 0.0)).startswith("up: must be a direction, not 0 0 0")
     millimetres = ROOM * 1000
     assert "in its 2000 x 1600 x 4" in refused(tmp_path, millimetres)
     assert "pitch: must give at most 4,000,000 cells on the 20" in refused(

@@ -17,7 +17,11 @@ from jaxbiped.commands.stereo import StereoArgs
 from jaxbiped.config import load_toml
 from jaxbiped.errors import InputError
 from jaxbiped.mapping import class_grid
+from jaxbiped.mapping.chart import ONE_LOOK, lay_out, make_chart
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.sensing.stereo import Disparity, to_points
+from jaxbiped.sensing.stereo.calibration_files import load_rig
 
 CAMERA = Path(__file__).parents[2] / "configs" / "cameras" / "motorcycle.toml"
 
@@ -80,7 +84,7 @@ def test_the_motorcycle_becomes_a_map(mapped):
             assert min(picture.size) > 400
 
 
-# x ahead of the camera and y to its left [m], measured in the point cloud of the published disparities
+# x ahead of the camera and y to its left [m]; read off the map of the published disparities
 PLACES = {
     "before the front wheel": (2.02, -0.3),
     "front wheel": (2.15, -0.75),
@@ -89,6 +93,24 @@ PLACES = {
     "shelf": (3.6, -1.2),
     "behind the engine": (3.0, 0.2),
 }
+
+
+def test_its_map_is_that_of_the_published_disparities(mapped):
+    """Our matcher against Middlebury's structured light, by one transform and on one grid."""
+    truth = data.stereo_motorcycle()[2]
+    known = np.isfinite(truth)
+    camera = load_rig(CAMERA, (741, 500)).camera
+    x, y, z, weight = to_points(Disparity(np.where(known, truth, 0), known), camera)
+    T = np.array(json.loads((mapped / "stereo.json").read_text())["T_map_camera"])
+    points = np.stack([x, y, z], axis=1)[weight > 0] @ T[:3, :3].T + T[:3, 3]
+    ours = class_grid.load(mapped / "classes.npz")
+    spec, origin = lay_out(points, 0.05, area=ours.extent)
+    theirs = make_chart(points, spec, origin, RobotConfig().body(), ONE_LOOK).grid
+    both = (ours.classes != Cell.UNMEASURED) & (theirs.classes != Cell.UNMEASURED)
+    assert both.sum() > 0.75 * (ours.classes != Cell.UNMEASURED).sum()
+    assert (ours.classes == theirs.classes)[both].mean() > 0.9
+    for name, xy in PLACES.items():
+        assert ours.classes[ours.cell_at(xy)] == theirs.classes[theirs.cell_at(xy)], name
 
 
 def test_plan_takes_its_map(mapped):
