@@ -9,6 +9,7 @@ import pydantic
 from rich.console import Console
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
+from jaxbiped.commands.engine import EngineArgs, engine
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
@@ -19,11 +20,12 @@ from jaxbiped.report.tables import terminal
 from jaxbiped.study.comparison import default_pairs
 from jaxbiped.study.conduct import conduct, never
 from jaxbiped.study.config import StrategyName, StudyConfig
+from jaxbiped.study.groups import shards
 from jaxbiped.study.sequential import MEASURES, Goal
 from jaxbiped.study.stopping import Rule
 
 
-class CompareArgs(StudyConfig):
+class CompareArgs(EngineArgs, StudyConfig):
     """Compare strategies on random arenas: missions, paired statistics, tables and figures.
 
     A study in TOML may come first; options on the command line override it. A results folder in its place, or two,
@@ -69,8 +71,8 @@ def main(args: CompareArgs) -> int:
         f"{config.arenas} arenas, seed {config.seed}, sensor {config.mission.sensor}: {names}", highlight=False
     )
     enough = Rule(goal, out, config.arenas) if goal else never
-    with progress(console) as show:
-        manifest = conduct(out, config, resume=args.resume, on_progress=show, enough=enough)
+    with engine(args, console, len(shards(config, 1)), ordered=goal is not None) as how, progress(console) as show:
+        manifest = conduct(out, config, resume=args.resume, on_progress=show, enough=enough, **how)
     report = write_report(out)
     console.print(terminal(report.comparison))
     for sentence in report.remarks:

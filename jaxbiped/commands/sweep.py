@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from jaxbiped.commands.engine import EngineArgs, engine
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
@@ -14,13 +15,13 @@ from jaxbiped.report.sweep import terminal, write_sweep_report
 from jaxbiped.report.sweep_page import write_sweep_page
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.evaluate import WORKERS
-from jaxbiped.study.groups import group_points
+from jaxbiped.study.groups import group_points, shards
 from jaxbiped.study.memory import check_memory
 from jaxbiped.study.resume import refuse_taken
 from jaxbiped.study.sweep import SweepConfig
 
 
-class SweepArgs(SweepConfig):
+class SweepArgs(EngineArgs, SweepConfig):
     """Sweep numbers of the config: missions on the same random arenas at each point, tables and figures.
 
     The sweep in TOML comes first, such as sweeps/costs.toml; options on the command line override it.
@@ -41,7 +42,7 @@ def main(args: SweepArgs) -> int:
     Raises:
       InputError: a sweep that cannot be run, a folder that exists or cannot be written, a full disk.
     """
-    config = SweepConfig.model_validate(args.model_dump(exclude={"out", "resume"}))
+    config = SweepConfig.model_validate(args.model_dump(include=set(SweepConfig.model_fields)))
     if not config.fields():
         raise InputError(
             "a sweep needs [[axes]] or [sobol] in its file: jaxbiped sweep sweeps/costs.toml", field="axes"
@@ -63,8 +64,8 @@ def main(args: SweepArgs) -> int:
     programs = f"{len(groups)} compiled program{'s' * (len(groups) > 1)}"
     what = f"{len(points)} sweep points in {programs}, {config.arenas} arenas each, seed {config.seed}"
     console.print(f"{what}: {', '.join(config.strategies)}", highlight=False)
-    with progress(console) as show:
-        manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show)
+    with engine(args, console, len(shards(config, len(groups)))) as how, progress(console) as show:
+        manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show, **how)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
     report = write_sweep_report(out)
     console.print(terminal(report))

@@ -31,6 +31,8 @@ def conduct(
     resume: bool = False,
     on_progress: Callable[[Progress], None] | None = None,
     engine: Engine = evaluate,
+    device: str = "",
+    compile_time: Callable[[], float] | None = None,
     enough: Callable[[pl.DataFrame], bool] = never,
 ) -> store.Manifest:
     """Compute a study and store it, shard by shard. A process that dies loses at most the shard that it was at.
@@ -38,27 +40,54 @@ def conduct(
     Args:
       folder: must not exist or be empty; with `resume`, one where the same study was stopped, or none yet.
       points: sweep points; by default the one of `config`.
-      enough: is given each shard once, those that were stored before first, and says whether the study can end there.
+      device: of the engine, in words; by default that of this process.
+      compile_time: [s] that the engine has spent compiling so far; by default what this process has.
+      enough: is given each shard once, in the order of their numbers, and says whether the study can end there.
 
     Raises:
       InputError: a folder that is not so, or a full disk; what was stored stays readable.
     """
     clock = CompileClock()
+    compile_time = compile_time or (lambda: clock.seconds)
     swept = points is not None
     points = tuple(points) if swept else only_point(config)
     kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
+    kind["device_name"] = device
     if resume:
         results = take_up(folder, config, rows=shard_rows(config, points), **kind)
     else:
         results = store.create(folder, config, **kind)
     with results:
-        stored = (pl.read_parquet(path) for path in store.shard_paths(results.folder))
-        if not any(enough(frame) for frame in stored):
+        judge = in_order(enough)
+        paths = store.shard_paths(results.folder) if enough is not never else []
+        if not any(judge(store.shard_number(path), pl.read_parquet(path)) for path in paths):
             for shard, frame in engine(config, on_progress, points=points, done=results.done()):
-                results.append(frame, shard.number, compile_time=clock.seconds)
-                if enough(frame):
+                results.append(frame, shard.number, compile_time=compile_time())
+                if judge(shard.number, frame):
                     break
-        return results.finish(compile_time=clock.seconds)
+        return results.finish(compile_time=compile_time())
+
+
+def in_order(enough: Callable[[pl.DataFrame], bool]) -> Callable[[int, pl.DataFrame], bool]:
+    """`enough` for shards that come in any order, with their numbers: the others wait for the one whose turn it is.
+
+    Which shard ends first depends on what is in it, so that a rule which looked at them as they come would be biased.
+    """
+    waiting: dict[int, pl.DataFrame] = {}
+    turn = 0
+
+    def judge(number: int, frame: pl.DataFrame) -> bool:
+        nonlocal turn
+        if enough is never:
+            return False
+        waiting[number] = frame
+        while turn in waiting:
+            turn += 1
+            if enough(waiting.pop(turn - 1)):
+                return True
+        return False
+
+    return judge
 
 
 def shard_rows(config: StudyConfig, points: Sequence[Point]) -> list[int]:

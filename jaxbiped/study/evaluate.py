@@ -74,13 +74,19 @@ def evaluate(
         before = last[0]
 
 
-def compute(config: StudyConfig, group: Group, shard: Shard, on_progress: OnProgress = lambda tally: None):
-    """The rows of one shard: a function of its arguments alone, whatever was computed before, and where."""
+def compute(
+    config: StudyConfig,
+    group: Group,
+    shard: Shard,
+    on_progress: OnProgress = lambda tally: None,
+    workers: int = WORKERS,
+) -> pl.DataFrame:
+    """The rows of one shard: a function of config, group and shard alone, whatever was computed before, and where."""
     # The last shard is filled up with arenas beyond the study, so that all shards share one program.
     size = min(config.shard, config.arenas)
     index = shard.first + jnp.arange(size)
     batch, seeds = draw(jax.random.key(config.seed), index, config.families, group.populations)
-    play = run_all
+    play = partial(run_all, workers=workers)
     with contextlib.ExitStack() as stack:
         eyes = stack.enter_context(contextlib.closing(StereoEyes(group.camera))) if group.camera else None
         if group.walk is not None:

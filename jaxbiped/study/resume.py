@@ -28,12 +28,14 @@ def resume(
     arenas: int,
     rows: Sequence[int],
     points: pl.DataFrame | None = None,
+    device_name: str = "",
 ) -> Store:
     """A results folder open for writing what is left; where nothing was begun there, a new one.
 
     Args:
       rows: how many rows each shard has, by its number.
       points: of a sweep, as for `create`.
+      device_name: of where it will be computed; by default the devices that JAX sees here.
 
     Raises:
       InputError: the folder is finished, is being written, holds something else or a damaged shard, or was begun
@@ -41,11 +43,11 @@ def resume(
     """
     folder = Path(folder)
     if not begun(folder):
-        return create(folder, config, seed=seed, arenas=arenas, points=points)
+        return create(folder, config, seed=seed, arenas=arenas, points=points, device_name=device_name)
     manifest = read_manifest(folder)
     refuse_finished(folder, manifest)
     refuse_other_config(folder, manifest, config)
-    refuse_other_program(folder, manifest)
+    refuse_other_program(folder, manifest, device_name or device())
     lock = FolderLock(folder)
     try:
         manifest = read_manifest(folder)  # another process may have gone on with it before we had the lock
@@ -134,11 +136,11 @@ def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
         yield from leaves(value, f"{name}.{key}" if name else str(key))
 
 
-def refuse_other_program(folder: Path, manifest: Manifest) -> None:
+def refuse_other_program(folder: Path, manifest: Manifest, device_name: str) -> None:
     """Raise `InputError` where rows that were computed now might differ from those that are there."""
     here = versions()
     there = {"device": manifest.device.partition(" x ")[2], **manifest.versions}
-    here = {"device": device().partition(" x ")[2], **here}
+    here = {"device": device_name.partition(" x ")[2], **here}
     changes = [
         f"{name} {there.get(name, ABSENT)} (here {value})" for name, value in here.items() if there.get(name) != value
     ]

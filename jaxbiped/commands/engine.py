@@ -1,0 +1,52 @@
+"""Where the shards of a study are computed: options that commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+import pydantic
+from rich.console import Console
+
+from jaxbiped.config import Model
+from jaxbiped.errors import InputError
+
+
+class EngineArgs(Model):
+    """Options of `engine`."""
+
+    scheduler: str | None = None
+    """Address of a Dask scheduler, such as tcp://host:8786: its workers compute the shards. Needs jaxbiped[cluster]."""
+    workers: Annotated[int, pydantic.Field(ge=1, le=1024)] | None = None
+    """The same by this many worker processes on this machine, among which its cores are shared out."""
+
+
+@contextmanager
+def engine(args: EngineArgs, console: Console, shards: int, ordered: bool = False) -> Iterator[dict[str, Any]]:
+    """Arguments of `conduct` that say where shards are computed.
+
+    Args:
+      shards: of the study.
+      ordered: whether they are wanted in the order of their numbers.
+
+    Raises:
+      InputError: no such scheduler, or workers that cannot be used.
+    """
+    if args.scheduler is None and args.workers is None:
+        yield {}
+        return
+    if args.scheduler is not None and args.workers is not None:
+        raise InputError("goes with no --scheduler, which has its own workers", field="workers", value=args.workers)
+    try:
+        from jaxbiped.study.cluster import Cluster, connect, local_cluster
+    except ModuleNotFoundError as error:
+        field = "workers" if args.scheduler is None else "scheduler"
+        raise InputError(f"needs {error.name}: pip install 'jaxbiped[cluster]'", field=field) from None
+    with connect(args.scheduler) if args.scheduler else local_cluster(args.workers) as client:
+        cluster = Cluster(client, ordered=ordered)
+        count = cluster.workers()
+        console.print(f"{count} workers at {cluster.address}, {shards} shards", highlight=False)
+        if shards < count:
+            console.print("fewer shards than workers: a smaller --shard would give all of them work", highlight=False)
+        yield {"engine": cluster, "device": cluster.device, "compile_time": lambda: cluster.seconds}

@@ -1,0 +1,258 @@
+"""A study on many machines: Dask hands shards to worker processes, and this process writes what comes back.
+
+A shard is one task. It is a function of the study's config and of its number alone, so that a task whose worker died is
+computed by another one, and the rows are those of a study on one machine. A worker computes one shard at a time,
+by as many queues as it has threads, and compiles for itself: processes share compilations only where JAX keeps them
+on disk, in the folder that the environment variable JAX_COMPILATION_CACHE_DIR names to each of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import socket
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Collection, Iterator, Sequence
+from concurrent.futures import CancelledError
+from itertools import islice
+from urllib.parse import urlsplit
+
+import polars as pl
+from distributed import Client, Future, LocalCluster, wait
+from distributed.comm import CommClosedError
+from distributed.core import rpc
+from distributed.scheduler import KilledWorker
+from distributed.versions import VersionMismatchWarning
+
+from jaxbiped.errors import InputError
+from jaxbiped.files import reason
+from jaxbiped.mission.queue import Tally
+from jaxbiped.study import evaluate, worker
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.evaluate import Progress
+from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards
+from jaxbiped.study.worker import Compute
+
+ANSWER = 5.0  # [s] for the scheduler to answer
+WAITING = 30.0  # [s] for a worker to come, where there is none
+LOOK = 1.0  # [s] between two looks at which workers there are
+LOST = (CancelledError, CommClosedError, OSError)  # what Dask raises when the scheduler is gone
+
+
+class Cluster:
+    """An engine of `conduct`: shards computed by the workers of a Dask scheduler.
+
+    Args:
+      client: connected. All its workers are checked now, those that join later with their first shard.
+      ordered: give shards in the order of their numbers, which a rule that may end the study needs: the order in which
+        they end depends on what is in them.
+      compute: called as `evaluate.compute`, on a worker.
+
+    Raises:
+      InputError: no worker comes, or one with other versions or another kind of device than the rest; while shards
+        are computed also: the scheduler or all workers are gone, or several workers died of one shard.
+    """
+
+    def __init__(self, client: Client, *, ordered: bool = False, compute: Compute = evaluate.compute):
+        self.client, self.ordered, self.compute = client, ordered, compute
+        self.address = client.scheduler.address
+        self.compiling: dict[str, float] = {}  # [s] of each worker
+        self.seen = time.monotonic()  # when there was a worker
+        while not self.workers():
+            time.sleep(0.1)
+        self.versions = worker.versions()
+        with self.connection():
+            for address, answer in sorted(client.get_versions(packages=worker.PACKAGES)["workers"].items()):
+                worker.refuse_other_versions(address, worker.chosen(answer["packages"]), self.versions)
+            devices = client.run(worker.devices)
+        self.kind = next(iter(devices.values()))[1]
+        for address, (_, kind) in sorted(devices.items()):
+            worker.refuse_other_device(address, kind, self.kind)
+        self.device = f"{sum(count for count, _ in devices.values())} x {self.kind}"
+
+    @property
+    def seconds(self) -> float:
+        """Spent compiling, by the worker that compiled longest: they compile side by side."""
+        return max(self.compiling.values(), default=0.0)
+
+    def __call__(
+        self,
+        config: StudyConfig,
+        on_progress: Callable[[Progress], None] | None = None,
+        *,
+        points: Sequence[Point] | None = None,
+        done: Collection[int] = (),
+    ) -> Iterator[tuple[Shard, pl.DataFrame]]:
+        """As `evaluate.evaluate`."""
+        groups = group_points(points or only_point(config), config.strategies)
+        left = [shard for shard in shards(config, len(groups)) if shard.number not in done]
+        total = sum(shard.count * len(groups[shard.group].population_of) for shard in left)
+        board, topic = Board(on_progress, total), f"jaxbiped-{uuid.uuid4()}"
+        todo = iter(left)
+        running: dict[Future, Shard] = {}
+        held: dict[int, tuple[Shard, pl.DataFrame]] = {}  # that wait for those before them
+        turns = [shard.number for shard in reversed(left)]  # the next one last
+        self.client.subscribe_topic(topic, board.hear)
+        try:
+            while turns:
+                # As many shards as workers, so that none waits at a worker while another one has nothing to do. Where
+                # their order counts, not far beyond the one whose turn it is.
+                count = self.workers()
+                room = min(count - len(running), 2 * count - len(running) - len(held))
+                for shard in islice(todo, max(0, room)):
+                    running[self.submit(config, groups[shard.group], shard, topic)] = shard
+                for future in self.ended(running):
+                    shard = running.pop(future)
+                    frame = self.result(future, shard)
+                    board.end(shard.number, frame)
+                    held[shard.number] = shard, frame
+                while held and (turns[-1] in held or not self.ordered):
+                    turn = turns.pop()
+                    yield held.pop(turn if self.ordered else next(iter(held)))
+        finally:
+            with contextlib.suppress(*LOST):
+                self.client.unsubscribe_topic(topic)
+                self.client.cancel(list(running))
+
+    def submit(self, config: StudyConfig, group: Group, shard: Shard, topic: str) -> Future:
+        """A shard as a task."""
+        arguments = self.compute, config, group, shard, topic, self.versions, self.kind
+        with self.connection():
+            return self.client.submit(worker.work, *arguments, key=f"shard-{shard.number}-{topic}", pure=False)
+
+    def ended(self, running: Collection[Future]) -> list[Future]:
+        """Those that have ended, after at most `LOOK` seconds."""
+        with self.connection(), self.client.as_current():
+            if not running:
+                time.sleep(LOOK)
+                return []
+            try:
+                done = wait(list(running), timeout=LOOK, return_when="FIRST_COMPLETED").done
+            except TimeoutError:
+                return []
+        return [future for future in running if future in done]
+
+    def result(self, future: Future, shard: Shard) -> pl.DataFrame:
+        """The rows of a task that has ended."""
+        if future.status == "error":
+            error = future.exception()
+            if isinstance(error, KilledWorker):
+                message = (
+                    "its workers died, one after the other, of too little memory perhaps: a smaller --shard needs less"
+                )
+                raise InputError(message, field=f"shard {shard.number}")
+            raise error
+        with self.connection():
+            frame, address, seconds = future.result()
+        self.compiling[address] = self.compiling.get(address, 0.0) + seconds
+        return frame
+
+    def workers(self) -> int:
+        """How many there are; `InputError` when there has been none for too long."""
+        with self.connection():
+            count = len(self.client.nthreads())
+        if count:
+            self.seen = time.monotonic()
+        elif time.monotonic() - self.seen > WAITING:
+            message = f"has had no worker for {WAITING:.0f} s; start some: `dask worker {self.address}`"
+            raise InputError(message, field="scheduler", value=self.address)
+        return count
+
+    @contextlib.contextmanager
+    def connection(self) -> Iterator[None]:
+        """Where the scheduler may be found to be gone."""
+        try:
+            yield
+        except LOST:
+            message = "is gone; what was stored is readable, and --resume goes on with it"
+            raise InputError(message, field="scheduler", value=self.address) from None
+
+
+class Board:
+    """What workers tell of how far their shards are, added up."""
+
+    def __init__(self, on_progress: Callable[[Progress], None] | None, total: int):
+        self.on_progress, self.total = on_progress, total
+        self.tallies: dict[int, Tally] = {}
+        self.over: set[int] = set()
+
+    def hear(self, event: tuple[float, Sequence[int]]) -> None:
+        """A word of a worker; called from Dask's thread."""
+        number, ended, reached = event[1]
+        if number not in self.over:
+            self.tell(number, Tally(ended, reached))
+
+    def end(self, number: int, frame: pl.DataFrame) -> None:
+        """A shard has ended."""
+        self.over.add(number)
+        self.tell(number, Tally(len(frame), int(frame["success"].sum())))
+
+    def tell(self, number: int, tally: Tally) -> None:
+        """Pass on where all of them are."""
+        self.tallies[number] = tally
+        whole = sum(list(self.tallies.values()), Tally(0, 0))
+        if self.on_progress:
+            self.on_progress(Progress(whole.ended, whole.reached, self.total))
+
+
+@contextlib.contextmanager
+def connect(scheduler: str) -> Iterator[Client]:
+    """A client of the scheduler at an address; `InputError` when there is none."""
+    knock(scheduler)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", VersionMismatchWarning)  # we say it ourselves
+        client = Client(scheduler, timeout=ANSWER, set_as_default=False)
+    with client:
+        yield client
+
+
+def knock(scheduler: str) -> None:
+    """Raise `InputError` unless a Dask scheduler answers; `Client` itself would try for long, and say much."""
+    try:
+        parts = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}")
+        sound = parts.scheme in ("tcp", "tls") and None not in (parts.hostname, parts.port)
+    except ValueError:
+        sound = False
+    if not sound:
+        raise InputError("must be the address of a Dask scheduler, tcp://host:8786", field="scheduler", value=scheduler)
+
+    async def ask() -> str:
+        async with rpc(scheduler, timeout=ANSWER) as listener:
+            return (await listener.identity())["type"]
+
+    try:
+        socket.create_connection(
+            (parts.hostname, parts.port), timeout=ANSWER
+        ).close()  # fails at once, Dask tries again
+        kind = asyncio.run(asyncio.wait_for(ask(), ANSWER))
+    except Exception as error:  # what else listens there may say anything
+        problem = reason(error) if isinstance(error, OSError) and error.strerror else "what listens there is none"
+        message = f"no Dask scheduler answers there: {problem}"
+        raise InputError(message, field="scheduler", value=scheduler) from None
+    if kind != "Scheduler":
+        raise InputError(
+            f"is the address of a Dask {kind.lower()}, not of its scheduler", field="scheduler", value=scheduler
+        )
+
+
+@contextlib.contextmanager
+def local_cluster(workers: int) -> Iterator[Client]:
+    """A client of worker processes on this machine, among which its cores are shared out; they end with it."""
+    threads = max(1, len(os.sched_getaffinity(0)) // workers)
+    with (
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=threads,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            memory_limit=0,  # a worker is not killed for what it needs while it compiles
+            silence_logs=logging.CRITICAL,
+            env={"PJRT_NPROC": threads},  # XLA's own threads
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client

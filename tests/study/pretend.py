@@ -1,0 +1,28 @@
+"""Made-up shards for a cluster: `evaluate.compute` that takes no time, and leaves a mark of where it was called."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import polars as pl
+
+from jaxbiped.mission.queue import Tally
+from tests.study.engine import TABLE
+
+
+def compute(config, group, shard, on_progress, workers, *, begun, pause=0.0, slow=(), deadly=()):
+    """The rows of `tests.study.engine.TABLE` that are a shard's.
+
+    Args:
+      begun: file that gets a line: shard, process, threads.
+      pause: [s] that it takes; a second more for shards in `slow`.
+      deadly: shards of which a worker dies.
+    """
+    with open(begun, "a") as file:
+        file.write(f"{shard.number} {os.getpid()} {workers}\n")
+    if shard.number in deadly:
+        os._exit(9)
+    time.sleep(pause + (shard.number in slow))
+    on_progress(Tally(2, 1))
+    return TABLE.filter(pl.col("arena").is_between(shard.first, shard.first + shard.count - 1))
