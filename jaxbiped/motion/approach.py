@@ -60,7 +60,7 @@ def next_crossing(
     levels: Int[Array, "H W"],
     spec: GridSpec,
 ) -> Crossing:
-    """The first edge that a path crosses before it enters what is unmeasured or a gate.
+    """The first edge that a path crosses before it enters what is unmeasured.
 
     Args:
       directions: first moves of the path, indices into DIRECTIONS; -1 after its end.
@@ -69,7 +69,7 @@ def next_crossing(
     cells = jnp.concatenate([ij[None], ij[None] + jnp.cumsum(steps, axis=0)])
     kinds, heights = classes[cells[:, 0], cells[:, 1]], levels[cells[:, 0], cells[:, 1]].astype(jnp.int32)
     rises = heights[1:] - heights[:-1]
-    walked = (kinds[1:] == Cell.FLOOR) | (kinds[1:] == Cell.BUMP)
+    walked = (kinds[1:] != Cell.UNMEASURED) & (kinds[1:] != Cell.OBSTACLE)
     reached = jnp.cumprod((walked & (directions >= 0)).astype(jnp.int32)).astype(bool)
     over = reached & (rises != 0)
     k = jnp.argmax(over)

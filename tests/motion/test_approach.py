@@ -59,9 +59,15 @@ def test_oblique_path_crosses_to_the_side():
 def test_no_crossing_beyond_foresight_nor_beyond_the_unknown():
     assert not bool(crossing_of(0.525).edge.known)
     assert not bool(crossing_of(0.775, moves=(0, 0, -1, -1, -1, -1)[:MOVES]).edge.known)
-    for kind in (Cell.UNMEASURED, Cell.GATE, Cell.OBSTACLE):
+    for kind in (Cell.UNMEASURED, Cell.OBSTACLE):
         classes, levels = ground()
         assert not bool(crossing_of(0.775, maps=(classes.at[14, 17].set(kind), levels)).edge.known)
+
+
+def test_an_edge_that_leads_into_a_gate_is_crossed_like_any_other():
+    classes, levels = ground(last=30)
+    found = crossing_of(1.375, maps=(classes.at[:, 30:].set(Cell.GATE), levels))
+    assert bool(found.edge.known) and int(found.edge.rise) == -1
 
 
 def test_what_was_measured_is_remembered_while_it_fits():
