@@ -125,12 +125,12 @@ def speed(place, eyes, config) -> None:
     sensor.show(place.arena)
     pair = sensor.renderer.pair(origin, basis, sensor.camera.image_noise, int(seed))
     grey = [matching.grey(image) for image in (pair.left, pair.right)]
-    disparity = matching.match(pair.left, pair.right, sensor.params)
+    disparity = sensor.match(pair)
     believed, spread = place.poses[0], jax.device_get(settings.landmarks)
     parts = {
         "rendering and noise": lambda: sensor.renderer.pair(origin, basis, sensor.camera.image_noise, 1),
         "OpenCV's matcher": lambda: matching.search(*grey, sensor.params),
-        "matching in all": lambda: matching.match(pair.left, pair.right, sensor.params),
+        "matching in all": lambda: sensor.match(pair),
         "landmarks": lambda: landmarks.find(pair.left, pair.right, sensor.rig, at, 0.0),
         "points": lambda: sensor.view(disparity, at, 2.0),
         "measuring in all": lambda: sensor.measure(pair, place.arena, at, believed, 2.0, spread),

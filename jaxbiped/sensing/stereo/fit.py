@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 
 from jaxbiped.sensing.noise import NoiseConfig
-from jaxbiped.sensing.stereo.matching import match
 from jaxbiped.sensing.stereo.measure import StereoSensor
 
 LAG = 8  # [px] over which slopes and edges are told: from a ray to the next
@@ -48,7 +47,7 @@ def watch(sensor: StereoSensor, origin: Float[np.ndarray, "3"], basis: Float[np.
     """The matcher at work on the arena that the sensor shows, from one place."""
     camera = sensor.camera
     pair = sensor.renderer.pair(origin, basis, camera.image_noise, seed, depth=True)
-    found = match(pair.left, pair.right, sensor.params).value
+    found = sensor.match(pair).value
     far_right = sensor.renderer.depth(
         np.asarray(origin, float) + np.asarray(basis, float)[:, 0] * camera.baseline, basis
     )

@@ -13,10 +13,11 @@ from jaxbiped.sensing.landmarks import LandmarkNoise
 from jaxbiped.sensing.shot import Shot
 from jaxbiped.sensing.stereo.calibration import ideal
 from jaxbiped.sensing.stereo.landmarks import find
-from jaxbiped.sensing.stereo.matching import Disparity, MatchParams, match
+from jaxbiped.sensing.stereo.matching import Disparity, MatchParams, grey, match
 from jaxbiped.sensing.stereo.points import to_points
 from jaxbiped.sensing.stereo.recognise import floor_disparity, recognise
 from jaxbiped.sensing.stereo.renderer import Pair, Renderer
+from jaxbiped.sensing.stereo.texture import textured
 from jaxbiped.sensing.view import Sightings, View
 
 STRIDE = 2  # pixels from a point to the next, across and down: a matcher's pixels hang together over more than that
@@ -78,7 +79,7 @@ class StereoSensor:
         self, pair: Pair, arena: Arena, at: Mount, believed: Pose, max_range: float, spread: LandmarkNoise
     ) -> Shot:
         """What a pair of pictures shows."""
-        disparity = match(pair.left, pair.right, self.params)
+        disparity = self.match(pair)
         floor = -float(believed.z)
         marks, patches = find(pair.left, pair.right, self.rig, at, floor)
         below = float(at.height) - floor
@@ -86,6 +87,12 @@ class StereoSensor:
         disparity = Disparity(np.where(known > 0, known, disparity.value), disparity.valid | (known > 0))
         sightings = recognise(marks, arena.landmarks, believed, spread)
         return Shot(self.view(disparity, at, max_range), sightings, pair.left, disparity.value)
+
+    def match(self, pair: Pair) -> Disparity:
+        """Disparities of what is textured (paper, 3.1: stereo is unstable on what is poor in texture)."""
+        found = match(pair.left, pair.right, self.params)
+        valid = found.valid & textured(grey(pair.left), self.camera.image_noise)
+        return Disparity(np.where(valid, found.value, np.float32(0)), valid)
 
     def nothing(self, arena: Arena) -> Shot:
         """A measurement of nothing."""
