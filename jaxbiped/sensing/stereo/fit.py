@@ -21,6 +21,7 @@ LAG = 8  # [px] over which slopes and edges are told: from a ray to the next
 THIN = 3  # every so many pixels across and down are kept
 CORE = 1.0  # [px] beyond which a disparity is wrong, not noisy
 SAME_DEPTH = 0.01  # relative: what both cameras see in one place is the same surface
+SLOPES = np.round(np.arange(0.2, 1.5, 0.02), 2)  # [px/px] that may be called grazing
 FLAT = 0.02  # [px/px] slope of what faces the camera
 RIM, CREASE = 14, 0.02  # [px] that a rim's own texture reaches; second difference of disparity at one
 FEWEST = 200  # pixels of a kind that tell something of it
@@ -153,11 +154,12 @@ def share(
 def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
     """The noise that makes the ray-cast sensor measure as the matcher did; `base` has what no picture tells.
 
-    From `base` come the quantum, the thresholds that tell edges and grazing incidence, the attitude's error, the range,
-    and the least contrast.
+    From `base` come the quantum, what tells an edge, the attitude's error, the range, and the least contrast.
     """
-    edge, grazing = w.bend > base.edge_jump, w.steepest > base.grazing_slope
     visible, measured = w.common & ~w.near, w.found > 0
+    edge = w.bend > base.edge_jump
+    steep = grazing_slope(w.slope[visible & ~edge], measured[visible & ~edge], base.grazing_slope)
+    grazing = w.steepest > steep
     plain = visible & ~edge & ~grazing
     error = w.found - w.true
     noisy = plain & measured & (np.abs(error) < CORE)
@@ -170,6 +172,7 @@ def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
         "sd": sd,
         "slope_gain": gain,
         "correlation": float(np.clip(correlation(w, noisy, error), 0.0, 0.5)),
+        "grazing_slope": steep,
         "drop_plain": share(~measured, plain),
         "drop_edge": share(~measured, visible & edge & ~grazing),
         "drop_grazing": share(~measured, visible & grazing, otherwise=base.drop_grazing),
@@ -178,6 +181,27 @@ def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
         "phantom_near": share(wild, w.near, otherwise=base.phantom_near),
     }
     return base.model_copy(update={name: round(value, 4) for name, value in found.items()})
+
+
+def grazing_slope(across: Float[np.ndarray, "N"], measured: Bool[np.ndarray, "N"], otherwise: float) -> float:
+    """Slope [px/px] across the image from which on surfaces are lost: of all thresholds the likeliest.
+
+    The model has one share that is lost below it, and another above.
+    """
+    order = np.argsort(across)
+    across, lost = across[order], np.cumsum(~measured[order])
+    candidates = np.searchsorted(across, SLOPES)
+
+    def likelihood(lost: np.ndarray, of: np.ndarray) -> np.ndarray:
+        rate = np.clip(lost / np.maximum(of, 1), 1e-6, 1 - 1e-6)
+        return lost * np.log(rate) + (of - lost) * np.log1p(-rate)
+
+    enough = (candidates >= FEWEST) & (len(across) - candidates >= FEWEST)
+    if not enough.any():
+        return otherwise
+    below = np.where(candidates > 0, lost[np.maximum(candidates, 1) - 1], 0)
+    total = likelihood(below, candidates) + likelihood(lost[-1] - below, len(across) - candidates)
+    return float(SLOPES[np.argmax(np.where(enough, total, -np.inf))])
 
 
 def spread(error: Float[np.ndarray, "N"], across: Float[np.ndarray, "N"]) -> tuple[float, float]:
