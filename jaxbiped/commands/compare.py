@@ -14,6 +14,7 @@ from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import refuse_existing
+from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.mission.settings import SIMULATED, program
 from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import terminal
@@ -62,6 +63,7 @@ def main(args: CompareArgs) -> int:
         from jaxbiped.mission.walking import rehearse  # loads MuJoCo
 
         rehearse(config.mission)
+    try_eyes(config.mission)
     out = args.out or Path("results") / f"compare-{config_hash(config)}"
     if not args.resume:
         refuse_existing(out)

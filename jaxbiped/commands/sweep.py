@@ -10,6 +10,7 @@ from jaxbiped.commands.engine import EngineArgs, engine
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
+from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.mission.settings import SIMULATED
 from jaxbiped.report.sweep import terminal, write_sweep_report
 from jaxbiped.report.sweep_page import write_sweep_page
@@ -57,6 +58,7 @@ def main(args: SweepArgs) -> int:
 
         for point in points:
             rehearse(point.mission)
+    try_eyes(config.mission)
     out = args.out or Path("results") / f"sweep-{config_hash(config)}"
     if not args.resume:
         refuse_taken(out)

@@ -95,6 +95,16 @@ def eyes_for(config: MissionConfig) -> StereoEyes | None:
     return StereoEyes(config.camera) if config.sensor in RENDERED else None
 
 
+def try_eyes(config: MissionConfig) -> None:
+    """Refuse, before anything is printed or written, a sensor that does not work on this machine.
+
+    Raises:
+      InputError: nothing can be rendered here.
+    """
+    if eyes := eyes_for(config):
+        eyes.close()
+
+
 @jax.jit
 def where(
     world: World, mind: Mind, settings: Settings, carriage: Carriage | None

@@ -60,7 +60,10 @@ def test_floor_without_texture_ends_by_name(scene, capsys):
     assert told["code"] in ("reached", "no_path", "stuck", "out_of_steps")
 
 
-@pytest.mark.parametrize("argv", [("run", "short.toml", "--sensor", "stereo"), ("fit-sensor",)])
+@pytest.mark.parametrize(
+    "argv",
+    [("run", "short.toml", "--sensor", "stereo"), ("compare", "--arenas", "2", "--sensor", "stereo"), ("fit-sensor",)],
+)
 def test_machine_that_cannot_render(scene, capsys, monkeypatch, argv):
     def broken(name, width, height):
         raise ImportError("no such library")
