@@ -23,6 +23,8 @@ from jaxbiped.sensing.noise import NoiseConfig
 from jaxbiped.study.fitting import Fit, fit, sensor_toml
 from jaxbiped.study.sensors import Place, fused, looking, mission, same, score, worlds
 
+FINER = 2  # times as many rays: so that far cells are hit as often as a pixel of a picture falls on them
+
 
 class FitSensorArgs(Model):
     """Render arenas, watch the matcher and the landmarks, fit the noise of the ray-cast sensor to what is seen, and
@@ -95,20 +97,27 @@ def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, foun
     fitted = rendered.model_copy(update={"sensor": "raycast"} | {
         "stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})  # fmt: skip
     before = rendered.model_copy(update={"sensor": "raycast", "stereo": NoiseConfig()})
-    maps = {"stereo": [], "fitted": [], "before": []}
-    each = {"stereo": (rendered, eyes), "fitted": (fitted, None), "before": (before, None)}
+    many = {"columns": FINER * rendered.camera.columns, "rows": FINER * rendered.camera.rows}
+    finer = fitted.model_copy(update={"camera": rendered.camera.model_copy(update=many)})
+    each = {"stereo": (rendered, eyes), "fitted": (fitted, None), "finer": (finer, None), "before": (before, None)}
+    if rendered.camera.width % many["columns"] or rendered.camera.height % many["rows"]:
+        del each["finer"]
+    maps = {name: [] for name in each}
     show = Console(stderr=True)
     for place in track(places, description="maps", console=show, transient=True):
         for name, (how, sees) in each.items():
             maps[name].append(fused(place, looking(how, sees), how)[0])
-    stereo, ours, theirs = (np.stack(maps[name]) for name in each)
+    stereo = np.stack(maps["stereo"])
     count = len(places) * len(places[0].poses)
-    known = (stereo != Cell.UNMEASURED) | (ours != Cell.UNMEASURED)
-    print(f"maps       {len(places)} other arenas, {count} views: {np.mean(stereo == ours):.1%} of all cells the same, "
-          f"{np.mean((stereo == ours)[known]):.1%} of those that either measured "
-          f"(as it was: {np.mean(stereo == theirs):.1%})")  # fmt: skip
-    for name, made in (("stereo", stereo), ("fitted", ours)):
-        rated = score(list(made), [place.classes for place in places])
+    print(f"maps       {len(places)} other arenas, {count} views; cells that are those of stereo:")
+    for name in list(each)[1:]:
+        ours, how = np.stack(maps[name]), each[name][0].camera
+        both = (stereo != Cell.UNMEASURED) & (ours != Cell.UNMEASURED)
+        noise = "the preset `rendered`" if name == "before" else "the fitted noise"
+        print(f"           {np.mean(stereo == ours):.1%} with {noise} and {how.columns} x {how.rows} rays, "
+              f"{np.mean((stereo == ours)[both]):.1%} of what both measured")  # fmt: skip
+    for name in ("stereo", "fitted"):
+        rated = score(maps[name], [place.classes for place in places])
         kinds = ", ".join(f"{kind} {rated.recall[kind]:.3f} / {rated.precision[kind]:.3f}" for kind in rated.recall)
         print(f"{name:<10} right {rated.right:.3f}; recall / precision within one cell: {kinds}")
     if missions:

@@ -43,6 +43,7 @@ class StereoNoise:
     drop_grazing: Float[Array, "*B"]
     edge_jump: Float[Array, "*B"]
     grazing_slope: Float[Array, "*B"]
+    grazing_rise: Float[Array, "*B"]
     edge_swap: Float[Array, "*B"]
     phantom_hidden: Float[Array, "*B"]
     phantom_near: Float[Array, "*B"]
@@ -69,11 +70,13 @@ class NoiseConfig(Model):
     drop_edge: float = Field(0.20, ge=0, le=1)
     """Chance that a ray is lost at an edge."""
     drop_grazing: float = Field(0.45, ge=0, le=1)
-    """Chance that a ray is lost where the surface slopes by more than grazing_slope."""
+    """Chance that a ray is lost where the surface slopes by more than grazing_slope, or grazing_rise."""
     edge_jump: float = Field(2.5, gt=0, le=1000)
     """[px] second difference of disparity from which a ray counts as one at an edge."""
     grazing_slope: float = Field(0.8, gt=0, le=100)
     """[px/px] slope of disparity from which incidence counts as grazing; the floor has 0.3."""
+    grazing_rise: float = Field(0.8, gt=0, le=100)
+    """[px/px] the same, of disparities that rise to the right: such a surface turns away from the right camera."""
     edge_swap: float = Field(0.065, ge=0, le=1)
     """Chance that a ray at an edge takes the disparity from across the edge."""
     phantom_hidden: float = Field(0.02, ge=0, le=1)
@@ -143,7 +146,8 @@ def match(
     along = slope(to_up, to_down) * (1 / image.stride[1])
     bend_across, bend_along = jnp.abs(to_left + to_right), jnp.abs(to_up + to_down)
     edge = jnp.maximum(bend_across, bend_along) > noise.edge_jump
-    grazing = jnp.maximum(across, along) > noise.grazing_slope
+    turned = (to_right > 0) & (across > noise.grazing_rise)
+    grazing = (jnp.maximum(across, along) > noise.grazing_slope) | turned
     # What can be matched at all.
     hidden = hidden_from_right(disparity, image)
     near = d > camera.max_disparity

@@ -114,6 +114,7 @@ def match(disparity, contrast, camera, image, noise, seed):
     bend_across, bend_along = np.abs(to_left + to_right), np.abs(to_up + to_down)
     edge = (bend_across > noise.edge_jump) | (bend_along > noise.edge_jump)
     grazing = (across > noise.grazing_slope) | (along > noise.grazing_slope)
+    grazing |= (across > noise.grazing_rise) & (to_right > to_left)
 
     reach = 1
     while reach * image.stride[0] < HIDING_REACH:

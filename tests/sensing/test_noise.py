@@ -86,6 +86,8 @@ def test_drops_are_as_often_as_stated():
                - (0.1 + 2 * 0.2) / 3) < 0.01  # fmt: skip
     grazing = plane(80, along=0.5)
     assert abs(lost(grazing, slice(50, 64), grazing_slope=0.4, **chances) - 0.4) < 0.015
+    for slope, share in ((0.25, 0.4), (-0.25, 0.1)):  # only the first turns away from the right camera
+        assert abs(lost(plane(60, slope=slope), inner, grazing_rise=0.2, **chances) - share) < 0.015
 
 
 def test_a_thin_post_is_an_edge_and_not_grazing():

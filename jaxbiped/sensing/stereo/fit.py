@@ -34,6 +34,7 @@ class Watched:
     true: Float32[np.ndarray, "N"]  # [px] disparity; 0 where there is nothing to see
     found: Float32[np.ndarray, "N"]  # [px]; 0 where not measured
     slope: Float32[np.ndarray, "N"]  # [px/px] across the image
+    rise: Float32[np.ndarray, "N"]  # [px/px] the same where disparity rises to the right, else 0
     steepest: Float32[np.ndarray, "N"]  # [px/px] across or down
     bend: Float32[np.ndarray, "N"]  # [px] second difference
     beyond: Float32[np.ndarray, "N"]  # [px] from here to the other side of an edge
@@ -85,6 +86,7 @@ def thinned(
         d,
         found[n:-n, n:-n],
         across,
+        np.where(to_right > 0, across, 0),
         np.maximum(across, along),
         np.maximum(bend_across, bend_along),
         np.where(bend_across > bend_along, further_across, further_along),
@@ -154,12 +156,13 @@ def share(
 def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
     """The noise that makes the ray-cast sensor measure as the matcher did; `base` has what no picture tells.
 
-    From `base` come the quantum, what tells an edge, the attitude's error, the range, and the least contrast.
+    From `base` come the quantum, the thresholds of edges and of other slopes, the attitude's error, the range, and the
+    least contrast.
     """
     visible, measured = w.common & ~w.near, w.found > 0
     edge = w.bend > base.edge_jump
-    steep = grazing_slope(w.slope[visible & ~edge], measured[visible & ~edge], base.grazing_slope)
-    grazing = w.steepest > steep
+    rise = grazing_rise(w.rise[visible & ~edge], measured[visible & ~edge], base.grazing_rise)
+    grazing = (w.steepest > base.grazing_slope) | (w.rise > rise)
     plain = visible & ~edge & ~grazing
     error = w.found - w.true
     noisy = plain & measured & (np.abs(error) < CORE)
@@ -172,7 +175,7 @@ def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
         "sd": sd,
         "slope_gain": gain,
         "correlation": float(np.clip(correlation(w, noisy, error), 0.0, 0.5)),
-        "grazing_slope": steep,
+        "grazing_rise": rise,
         "drop_plain": share(~measured, plain),
         "drop_edge": share(~measured, visible & edge & ~grazing),
         "drop_grazing": share(~measured, visible & grazing, otherwise=base.drop_grazing),
@@ -183,24 +186,24 @@ def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
     return base.model_copy(update={name: round(value, 4) for name, value in found.items()})
 
 
-def grazing_slope(across: Float[np.ndarray, "N"], measured: Bool[np.ndarray, "N"], otherwise: float) -> float:
-    """Slope [px/px] across the image from which on surfaces are lost: of all thresholds the likeliest.
+def grazing_rise(rise: Float[np.ndarray, "N"], measured: Bool[np.ndarray, "N"], otherwise: float) -> float:
+    """Rise [px/px] to the right from which on surfaces are lost: of all thresholds the likeliest.
 
     The model has one share that is lost below it, and another above.
     """
-    order = np.argsort(across)
-    across, lost = across[order], np.cumsum(~measured[order])
-    candidates = np.searchsorted(across, SLOPES)
+    order = np.argsort(rise)
+    rise, lost = rise[order], np.cumsum(~measured[order])
+    candidates = np.searchsorted(rise, SLOPES)
 
     def likelihood(lost: np.ndarray, of: np.ndarray) -> np.ndarray:
         rate = np.clip(lost / np.maximum(of, 1), 1e-6, 1 - 1e-6)
         return lost * np.log(rate) + (of - lost) * np.log1p(-rate)
 
-    enough = (candidates >= FEWEST) & (len(across) - candidates >= FEWEST)
+    enough = (candidates >= FEWEST) & (len(rise) - candidates >= FEWEST)
     if not enough.any():
         return otherwise
     below = np.where(candidates > 0, lost[np.maximum(candidates, 1) - 1], 0)
-    total = likelihood(below, candidates) + likelihood(lost[-1] - below, len(across) - candidates)
+    total = likelihood(below, candidates) + likelihood(lost[-1] - below, len(rise) - candidates)
     return float(SLOPES[np.argmax(np.where(enough, total, -np.inf))])
 
 
