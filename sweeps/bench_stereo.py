@@ -101,10 +101,9 @@ def poses(places, eyes, config) -> None:
           f"(wanted: 3, 0.3), 95 % within {most[0]:.1f} mm {most[1]:.2f} deg (15, 1.5)")  # fmt: skip
 
 
-def sensors(places, eyes, config, preset, missions) -> None:
-    """The ray-cast sensor with a preset in the same places, and in whole missions."""
-    known = sensor_preset(str(preset))
-    cast = config.model_copy(update={"sensor": "raycast", "stereo": known.stereo, "landmarks": known.landmarks})
+def sensors(places, eyes, config, missions) -> None:
+    """The ray-cast sensor with the preset in the same places, and in whole missions."""
+    cast = config.model_copy(update={"sensor": "raycast"})
     fine = cast.model_copy(update={"camera": CameraConfig(columns=128, rows=96)})
     each = ("stereo", config, eyes), ("64 x 48", cast, None), ("128 x 96", fine, None)
     made = {name: np.stack([fused(place, looking(how, sees), how)[0] for place in places]) for name, how, sees in each}
@@ -156,16 +155,19 @@ def main() -> None:
     parser.add_argument("--arenas", type=int, default=12, help="random arenas")
     parser.add_argument("--views", type=int, default=10, help="views of each")
     parser.add_argument("--missions", type=int, default=0, help="missions of both sensors, at most one an arena")
-    parser.add_argument("--preset", default=PRESET, help="sensor file of the ray-cast sensor")
+    parser.add_argument(
+        "--preset", default=PRESET, help="sensor file of the ray-cast sensor; what both expect of landmarks"
+    )
     options = parser.parse_args()
-    config = MissionConfig(sensor="stereo")
+    known = sensor_preset(str(options.preset))
+    config = MissionConfig(sensor="stereo", stereo=known.stereo, landmarks=known.landmarks)
     with contextlib.closing(StereoEyes(config.camera)) as eyes:
         places = list(worlds(SEED, FIRST, options.arenas, options.views, config))
         speed(places[0], eyes, config)
         matcher(places, eyes, config)
         maps(places, eyes, config)
         poses(places, eyes, config)
-        sensors(places, eyes, config, options.preset, min(options.missions, len(places)))
+        sensors(places, eyes, config, min(options.missions, len(places)))
 
 
 if __name__ == "__main__":

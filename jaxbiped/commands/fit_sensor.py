@@ -94,8 +94,8 @@ def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
 
 def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, found: Fit, missions: int) -> None:
     """Print how close both sensors come on arenas that were not fitted to: with the fitted noise, and as it was."""
-    fitted = rendered.model_copy(update={"sensor": "raycast"} | {
-        "stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})  # fmt: skip
+    rendered = rendered.model_copy(update={"stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})
+    fitted = rendered.model_copy(update={"sensor": "raycast"})
     before = rendered.model_copy(update={"sensor": "raycast", "stereo": NoiseConfig()})
     many = {"columns": FINER * rendered.camera.columns, "rows": FINER * rendered.camera.rows}
     finer = fitted.model_copy(update={"camera": rendered.camera.model_copy(update=many)})

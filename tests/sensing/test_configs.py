@@ -22,7 +22,17 @@ def test_sensor_files_equal_the_constants(name):
 
 
 def test_sensor_folder_holds_the_presets_and_nothing_else():
-    assert {path.stem for path in (CONFIGS / "sensors").glob("*.toml")} == set(PRESETS)
+    """But for the one that `jaxbiped fit-sensor` wrote."""
+    assert {path.stem for path in (CONFIGS / "sensors").glob("*.toml")} == set(PRESETS) | {"stereo"}
+
+
+def test_fitted_sensor_says_everything():
+    path = CONFIGS / "sensors" / "stereo.toml"
+    fitted, written = config.load(SensorConfig, path), config.load_toml(path)
+    assert path.read_text().startswith("# Written by `jaxbiped fit-sensor")
+    for part in ("stereo", "landmarks"):
+        assert set(written[part]) == set(type(getattr(fitted, part)).model_fields)
+    assert abs(fitted.stereo.bias) < 0.1 and 0.1 < fitted.stereo.sd < 0.2
 
 
 def test_camera_files():
