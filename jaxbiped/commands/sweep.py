@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jax
 from rich.console import Console
 
 from jaxbiped.commands.engine import EngineArgs, engine
@@ -52,7 +53,8 @@ def main(args: SweepArgs) -> int:
     groups = group_points(points, config.strategies)
     for group in groups:
         arenas = min(config.shard, config.arenas)
-        check_memory(group.static, len(group.points), len(config.strategies), arenas, WORKERS)
+        queues = max(WORKERS, jax.local_device_count())
+        check_memory(group.static, len(group.points), len(config.strategies), arenas, queues)
     if config.mission.executor in SIMULATED:
         from jaxbiped.mission.walking import rehearse  # loads MuJoCo
 

@@ -3,7 +3,7 @@
 Missions differ in length by a factor of ten, and a batch that waits for its longest member idles most of its slots. So
 a slot whose mission has ended takes the next job at once, inside the compiled loop. What a slot computes
 does not depend on its neighbours, hence a mission's result depends neither on the number of slots nor on its
-place in the queue.
+place in the queue. On several devices each works off a list of jobs of its own.
 """
 
 from __future__ import annotations
@@ -15,9 +15,11 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.sharding import Mesh
 from jaxtyping import Array, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.devices import ALL, EACH, on_each, placed
 from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
@@ -83,40 +85,65 @@ OnProgress = Callable[[Tally], None]
 Work = Callable[[Arena, Settings, Jobs, OnProgress], Result]
 
 
-def compile_queue(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int = SLOTS) -> Work:
+def compile_queue(
+    arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int = SLOTS, mesh: Mesh | None = None
+) -> Work:
     """The compiled driver for arguments of these shapes.
 
     Args:
       arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
       program: static. One compilation for each (program, slots, A, P, N), which later calls share.
-      slots: static.
+      slots: static; of each device.
+      mesh: static; devices of which each has a list of jobs, and `fill` and `segment` of its own: leaves of jobs,
+        count too, and of results have another axis [D] then, the first.
 
     Returns:
       A function of (arenas, settings, jobs, on_progress) that works the queue off and gives results in the order of
       the jobs; padding stays RUNNING. It may be called by several threads at once. `on_progress` is called on the
       host with the tally of the jobs, every `TURNS` decisions.
     """
-    signature = (program, slots, jax.tree.structure((arenas, settings, jobs)), *shapes((arenas, settings, jobs)))
+    signature = (program, slots, mesh, jax.tree.structure((arenas, settings, jobs)), *shapes((arenas, settings, jobs)))
     if signature not in COMPILED:
-        filled = fill.lower(arenas, settings, jobs, program, slots)
-        queue = jax.eval_shape(partial(fill, program=program, slots=slots), arenas, settings, jobs)
-        turned = segment.lower(queue, arenas, settings, jobs, program)
-        COMPILED[signature] = filled.compile(), wide(turned)
+        begun, turned = partial(fill, program=program, slots=slots), partial(segment, program=program)
+        if mesh is None:
+            begun, turned = jax.jit(begun), jax.jit(turned, donate_argnums=0)
+        else:
+            begun = on_each(on_row(begun, 2), mesh, (ALL, ALL, EACH))
+            turned = on_each(on_row(turned, 0, 3), mesh, (EACH, ALL, ALL, EACH), donate_argnums=0)
+        queue = jax.eval_shape(begun, arenas, settings, jobs)
+        lowered = begun.lower(arenas, settings, jobs), turned.lower(queue, arenas, settings, jobs)
+        COMPILED[signature] = lowered[0].compile(), wide(lowered[1])
     first, further = COMPILED[signature]
 
     def work(arenas: Arena, settings: Settings, jobs: Jobs, on_progress: OnProgress) -> Result:
+        if mesh is not None:
+            arenas, settings, jobs = placed(arenas, mesh, ALL), placed(settings, mesh, ALL), placed(jobs, mesh, EACH)
+        count = np.asarray(jobs.count)[..., None]
         queue = first(arenas, settings, jobs)
         while True:
             queue = further(queue, arenas, settings, jobs)
             code, job = jax.device_get((queue.result.code, queue.job))
             on_progress(tally(code))
-            if np.all(job >= jobs.count):
+            if np.all(job >= count):
                 return queue.result
 
     return work
 
 
 COMPILED: dict = {}
+
+
+def on_row(function: Callable, *which: int) -> Callable:
+    """`function` for arguments of which some have a leading axis of size 1, and then the result has."""
+
+    def call(*arguments):
+        arguments = [
+            jax.tree.map(lambda leaf: leaf[0], argument) if k in which else argument
+            for k, argument in enumerate(arguments)
+        ]
+        return jax.tree.map(lambda leaf: leaf[None], function(*arguments))
+
+    return call
 
 
 def wide(lowered: jax.stages.Lowered) -> jax.stages.Compiled:
@@ -132,7 +159,6 @@ def shapes(tree) -> list:
     return [(leaf.shape, str(leaf.dtype)) for leaf in jax.tree.leaves(tree)]
 
 
-@partial(jax.jit, static_argnames=("program", "slots"))
 def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int) -> Queue:
     """The queue with its first jobs in the slots."""
     job = jnp.arange(slots, dtype=jnp.int32)
@@ -142,7 +168,6 @@ def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots:
     return Queue(world, mind, job, jnp.int32(slots), result)
 
 
-@partial(jax.jit, static_argnames=("program",), donate_argnames=("queue",))
 def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program: Program) -> Queue:
     """Up to `TURNS` decisions of every slot."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -13,6 +14,7 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.devices import by_rows, mesh_of
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled, wavefront
 from jaxbiped.planning.costs import Costs, Rules, half_edges, tables
@@ -56,16 +58,20 @@ def field(
     rules: Rules | None = None,
     goal_ij: Int[Array | np.ndarray, "B 2"] | None = None,
     method: str = "auto",
+    devices: Sequence[jax.Device] | None = None,
 ) -> CostToGo:
     """`cost_to_go` of `edge_costs`, without ever holding all edge costs: the fast path.
 
     Arguments as there. May be called inside jit, where its chunks run one after the other; called from outside
     on a CPU they go to all cores. An arena's result does not depend on the others of its batch.
+
+    Args:
+      devices: called from outside, they share the batch; by default all of this process where they are no CPU.
     """
     if goal_ij is None:
         raise InputError("must be given", field="goal_ij")
     each = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, classes.shape[:1]), (costs or Costs(), rules or Rules()))
-    return _on_all_cores(_field, (classes, levels, each, goal_ij), _method(method, classes))
+    return _on_all_cores(_field, (classes, levels, each, goal_ij), _method(method, classes), devices)
 
 
 @partial(jax.jit, static_argnums=1)
@@ -137,10 +143,14 @@ def _method(name: str, grids) -> str:
     return "dijkstra" if cells > HUGE or (_is_large(grids) and grids.shape[0] < FEW) else "line_sweep"
 
 
-def _on_all_cores(solve, inputs, method: str) -> CostToGo:
-    """`solve` on pieces of the batch from as many threads as there are cores, if that is any use."""
+def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
+    """`solve` on pieces of the batch: on devices, or from as many threads as a CPU has cores, if that is any use."""
     batch, chunk = inputs[0].shape[0], CHUNK_LARGE if _is_large(inputs[0]) else CHUNK
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(inputs))
+    if not traced and devices is None and jax.default_backend() != "cpu" and jax.local_device_count() > 1:
+        devices = jax.local_devices()
+    if devices and not traced and batch:
+        return by_rows(solve, mesh_of(devices), method=method)(inputs)
     if traced or batch <= chunk or jax.default_backend() != "cpu":
         return solve(jax.tree.map(jnp.asarray, inputs), method)
     size = min(batch, chunk * -(-batch // (chunk * PIECES * (os.cpu_count() or 1))))

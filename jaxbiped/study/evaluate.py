@@ -18,10 +18,11 @@ from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 from jaxbiped import arenas as arena_room
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
+from jaxbiped.devices import by_rows, mesh_of
 from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, compile_queue
+from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.hashing import from_key
@@ -132,58 +133,77 @@ def run_all(
     static: Program,
     on_progress: OnProgress,
     workers: int = WORKERS,
-    slots: int = SLOTS,
+    slots: int | None = None,
     population_of: Int[np.ndarray, "P"] | None = None,
+    devices: Sequence[jax.Device] | None = None,
 ) -> Result:
     """The first `count` arenas under every point: results [P, count], on the host.
 
-    Jobs are dealt to as many queues as there are workers. Which queue a job is in does not change its result.
+    Jobs are dealt to as many queues as there are devices, or to as many as there are workers where there is one device.
+    Which queue a job is in does not change its result.
 
     Args:
       batch: [A], or [U * A] where there are `U` populations.
+      slots: of each queue; by default `SLOTS`, or less for few jobs, whatever the number of queues.
       population_of: which of these each point is about; by default the first.
+      devices: by default all of this process.
     """
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
     block = size * (np.zeros(kinds, int) if population_of is None else population_of)
     arena, point = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(kinds)))
     real = arena < count
     arena, point = np.concatenate([arena[real], arena[~real]]), np.concatenate([point[real], point[~real]])
-    workers = max(1, min(workers, count * kinds))
-    length = -(-size * kinds // workers)
+    devices = devices or jax.local_devices()
+    queues = len(devices) if len(devices) > 1 else max(1, min(workers, count * kinds))
+    length = -(-size * kinds // queues)
+    slots = slots or min(SLOTS, -(-size * kinds // WORKERS))
     hands = []
-    for worker in range(workers):
-        mine = np.arange(worker, size * kinds, workers)
+    for number in range(queues):
+        mine = np.arange(number, size * kinds, queues)
         mine = np.concatenate([mine, np.zeros(length - len(mine), int)])
-        active = len(range(worker, count * kinds, workers))
+        active = len(range(number, count * kinds, queues))
         place = jnp.asarray(arena[mine] + block[point[mine]])
         jobs = Jobs(place, jnp.asarray(point[mine]), seeds[arena[mine]], jnp.int32(active))
         hands.append(jobs)
-    work = compile_queue(batch, points, hands[0], static, min(slots, length))
-    tallies, lock = [Tally(0, 0)] * workers, threading.Lock()
+    if len(devices) > 1:
+        jobs, mesh = stack(hands), mesh_of(devices)
+        result = jax.device_get(
+            compile_queue(batch, points, jobs, static, slots, mesh)(batch, points, jobs, on_progress)
+        )
+        results = [jax.tree.map(lambda leaf, number=number: leaf[number], result) for number in range(queues)]
+    else:
+        results = run_threads(compile_queue(batch, points, hands[0], static, slots), batch, points, hands, on_progress)
+    out = jax.tree.map(lambda leaf: np.zeros((kinds, count), leaf.dtype), results[0])
+    for number, result in enumerate(results):
+        mine = np.arange(number, count * kinds, queues)
+        for all_rows, rows in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):
+            all_rows[point[mine], arena[mine]] = rows[: len(mine)]
+    return out
+
+
+def run_threads(
+    work: Work, batch: Arena, points: Settings, hands: Sequence[Jobs], on_progress: OnProgress
+) -> list[Result]:
+    """Work off queues at once, a thread each."""
+    tallies, lock = [Tally(0, 0)] * len(hands), threading.Lock()
     stop = threading.Event()
 
-    def play(worker: int) -> Result:
+    def play(number: int) -> Result:
         def tell(tally: Tally) -> None:
             if stop.is_set():
                 raise InterruptedError
             with lock:
-                tallies[worker] = tally
+                tallies[number] = tally
                 on_progress(sum(tallies, Tally(0, 0)))
 
-        return jax.device_get(work(batch, points, hands[worker], tell))
+        return jax.device_get(work(batch, points, hands[number], tell))
 
-    with ThreadPoolExecutor(workers) as pool:
+    with ThreadPoolExecutor(len(hands)) as pool:
         try:
-            results = list(pool.map(play, range(workers)))
+            return list(pool.map(play, range(len(hands))))
         except BaseException:
             stop.set()  # an interrupt shall not wait for the whole shard
             raise
-    out = jax.tree.map(lambda leaf: np.zeros((kinds, count), leaf.dtype), results[0])
-    for worker, result in enumerate(results):
-        mine = np.arange(worker, count * kinds, workers)
-        for all_rows, rows in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):
-            all_rows[point[mine], arena[mine]] = rows[: len(mine)]
-    return out
 
 
 def run_one_by_one(
@@ -220,11 +240,14 @@ def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
     """The oracle plans of all points [P * S] on the arenas [A] of their populations, all on the host."""
     kinds = len(group.population_of)
     out = OraclePlan(np.zeros((kinds, size), bool), *(np.zeros((kinds, size), np.float32) for _ in range(2)))
+    make = partial(oracle_plan, program=group.static)
+    if len(jax.local_devices()) > 1:
+        make = by_rows(oracle_plan, mesh_of(jax.local_devices()), shared=1, axis=1, program=group.static)
     for population in np.unique(group.population_of):
         mine = np.flatnonzero(group.population_of == population)
         arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
         settings = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.settings)
-        plan = jax.device_get(oracle_plan(arenas, settings, group.static))
+        plan = jax.device_get(make(arenas, settings))
         for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(plan), strict=True):
             rows[mine] = found
     return out
