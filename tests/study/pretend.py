@@ -8,6 +8,7 @@ import time
 import polars as pl
 
 from jaxbiped.mission.queue import Tally
+from jaxbiped.study.worker import PAUSE
 from tests.study.engine import TABLE
 
 
@@ -16,13 +17,13 @@ def compute(config, group, shard, on_progress, workers, *, begun, pause=0.0, slo
 
     Args:
       begun: file that gets a line: shard, process, threads.
-      pause: [s] that it takes; a second more for shards in `slow`.
+      pause: [s] that it takes; for shards in `slow` longer than what lies between two words of a worker.
       deadly: shards of which a worker dies.
     """
     with open(begun, "a") as file:
         file.write(f"{shard.number} {os.getpid()} {workers}\n")
     if shard.number in deadly:
         os._exit(9)
-    time.sleep(pause + (shard.number in slow))
+    time.sleep(pause + 1.2 * PAUSE * (shard.number in slow))
     on_progress(Tally(2, 1))
     return TABLE.filter(pl.col("arena").is_between(shard.first, shard.first + shard.count - 1))

@@ -150,6 +150,9 @@ def test_local_workers_go_on_with_it_and_back(whole, begun, tmp_path):
         on_cluster = Cluster(client, compute=partial(pretend.compute, begun=begun, slow=(3,)))
         with pytest.raises(KeyboardInterrupt):
             conduct(folder, CONFIG, resume=True, engine=stopping(on_cluster, 4), device=on_cluster.device)
+        told = []
+        assert len(list(on_cluster(CONFIG, told.append, done=set(range(10)) - {3, 5}))) == 2
+        assert [progress.ended for progress in told] == [8, 8 + 2, 8 + 8]  # shard 3 said that it had two missions done
         # Where the order counts it is kept, and the others do not run far ahead of a slow one.
         ordered = Cluster(client, ordered=True, compute=partial(pretend.compute, begun=begun, slow=(0, 4)))
         assert [shard.number for shard, _ in ordered(CONFIG, done={1})] == [0, *range(2, 10)]
