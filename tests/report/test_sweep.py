@@ -114,6 +114,7 @@ def test_the_command(tmp_path, monkeypatch, capsys):
         "manifest.json",
         "summary.md",
         "sweep.png",
+        "report.html",
     }
     points = read_points("r")
     assert points["costs.c3"].to_list() == [5, 10, 20] and points["point"].to_list() == [0, 1, 2]
