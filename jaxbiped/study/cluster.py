@@ -40,6 +40,8 @@ from jaxbiped.study.worker import Compute
 ANSWER = 5.0  # [s] for the scheduler to answer
 WAITING = 30.0  # [s] for a worker to come, where there is none
 LOOK = 1.0  # [s] between two looks at which workers there are
+# What a worker runs first: an interrupt from the terminal is meant for the client, which ends them.
+DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 LOST = (CancelledError, CommClosedError, OSError)  # what Dask raises when the scheduler is gone
 
 
@@ -97,6 +99,7 @@ class Cluster:
         held: dict[int, tuple[Shard, pl.DataFrame]] = {}  # that wait for those before them
         turns = [shard.number for shard in reversed(left)]  # the next one last
         self.client.subscribe_topic(topic, board.hear)
+        self.seen = time.monotonic()
         try:
             while turns:
                 # As many shards as workers, so that none waits at a worker while another one has nothing to do. Where
@@ -252,6 +255,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
             memory_limit=0,  # a worker is not killed for what it needs while it compiles
             silence_logs=logging.CRITICAL,
             env={"PJRT_NPROC": threads},  # XLA's own threads
+            preload=[DEAF],
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):

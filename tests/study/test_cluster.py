@@ -11,6 +11,8 @@ from functools import partial
 from pathlib import Path
 
 import dask
+import polars as pl
+import psutil
 import pytest
 
 from jaxbiped import cli
@@ -279,14 +281,28 @@ def test_options_that_do_not_go_together(capsys, monkeypatch, tmp_path):
     assert "workers: needs distributed: pip install 'jaxbiped[cluster]'" in capsys.readouterr().err
 
 
-@pytest.mark.slow  # three processes that compile the closed loop, two of them at once
+@pytest.mark.slow  # processes that compile the closed loop, the first of them for all
 def test_commands_on_workers_give_the_local_table(monkeypatch, tmp_path):
+    """The real loop, in a command of which a worker is killed midway; and a rule that takes shards in their order."""
     monkeypatch.chdir(tmp_path)
-    study = ["--arenas", "12", "--shard", "2", "--strategies", "full", "floor_only", "--sensor", "oracle"]
-    for name, more in (("local", []), ("spread", ["--workers", "2"])):
-        argv = ["compare", *study, "--out", name, "--until-width", "1.2", *more]
-        subprocess.run([sys.executable, "-m", "jaxbiped.cli", *argv], check=True)
-    (local, _), (spread, manifest) = (store.read(tmp_path / name) for name in ("local", "spread"))
-    assert local.equals(spread)
-    assert manifest.compile_time > 1 and manifest.device == "2 x cpu"
-    assert (tmp_path / "local/stopping.toml").read_text() == (tmp_path / "spread/stopping.toml").read_text()
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "cache"))
+    study = ["--arenas", "16", "--shard", "2", "--strategies", "full", "floor_only", "--sensor", "oracle"]
+
+    def start(out, *more):
+        return subprocess.Popen([sys.executable, "-m", "jaxbiped.cli", "compare", *study, "--out", out, *more])
+
+    assert start("local", "--until-width", "1.2").wait() == 0
+    assert start("ordered", "--until-width", "1.2", "--workers", "2").wait() == 0
+    (local, _), (ordered, manifest) = (store.read(tmp_path / name) for name in ("local", "ordered"))
+    assert local.equals(ordered) and manifest.device == "2 x cpu"
+    assert (tmp_path / "local/stopping.toml").read_text() == (tmp_path / "ordered/stopping.toml").read_text()
+    running = start("spread", "--workers", "2")
+    while len(store.shard_paths(tmp_path / "spread")) < 1:
+        assert running.poll() is None
+        time.sleep(0.01)
+    workers = [child for child in psutil.Process(running.pid).children() if "spawn_main" in " ".join(child.cmdline())]
+    assert len(workers) == 2
+    workers[0].kill()
+    assert running.wait() == 0
+    spread = store.read(tmp_path / "spread")[0]
+    assert spread.height == 32 and spread.filter(pl.col("arena").is_in(local["arena"].unique().to_list())).equals(local)
