@@ -7,11 +7,10 @@
 Both sides use the whole machine, with two threads and two processes, on the same arenas and strategies; compile time
 is apart. The compiled side works the list of missions off several times over, as a study has many.
 
-Measured on two virtual cores of an AMD EPYC, jax 0.10.2, runs of the command beside little other load:
-  compiled 643 to 657 missions/s (14,500 to 14,800 decisions/s) against 11.1 to 12.4 of the reference: ratios of 52 to
-  59, by rounds 48 to 59, 52 to 54 by CPU seconds. The same code and number of decisions in all of 100 missions. 18 s of
-  compiling.
-  A decision, each part alone: sense 24 us, map 57, plan 7, select 5, execute 5. The reference: 3.2 ms, 2.5, 1.4, and
+Measured on two virtual cores of an AMD EPYC, jax 0.10.2, with little other load:
+  compiled 598 missions/s (13,500 decisions/s) against 11.0 of the reference: a ratio of 54, by rounds 54 to 62, 55 by CPU
+  seconds. The same code and number of decisions in all of 100 missions. 23 s of compiling.
+  A decision, each part alone: sense 28 us, map 55, plan 3, select 5, execute 4. The reference: 3.3 ms, 3.0, 1.4, and
   0.5 for the last two.
   --stream: 2,048 arenas in shards of 1,024 peak at 2.88 GiB, 8,192 at 2.90 GiB.
   --sweep: 28 traces and 27 compilations for the first cost vector, none for the 64 that follow.

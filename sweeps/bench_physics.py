@@ -10,14 +10,13 @@ bare engine (wanted: at most 10 %); in brackets the same of the processors' time
 Measured on 2 cores of x86_64 without a GPU, mujoco 4.0.0, mujoco-mjx 3.17.0, jax 0.10.2, Newton 10/20 iterations,
 impratio 10, batch 64, with little other load:
 
-    native   0 boxes   3.7 contacts        110,700 steps/s, bare 113,200: +2.3 % (+1.7 %)
-    native   4 boxes   3.7 contacts        110,000 steps/s, bare 113,400: +3.1 % (+2.1 %)
-    mjx      0 boxes   8 contact slots       5,740 steps/s, bare  6,430: +12 % (+12 %)
-    mjx      4 boxes   16 contact slots      3,120 steps/s, bare  3,700: +19 % (+18 %)
+    native   0 boxes   3.7 contacts        111,800 steps/s, bare 112,900: +1.0 % (+1.3 %)
+    native   4 boxes   3.7 contacts        112,400 steps/s, bare 111,700: -0.7 % (-0.3 %)
+    mjx      0 boxes   8 contact slots       5,350 steps/s, bare  5,410: +1.2 % (+2.2 %)
+    mjx      4 boxes   17 contact slots      2,810 steps/s, bare  2,930: +4.2 % (+4.8 %)
 
-mjx compiled in 15 to 18 s on either side. Before it gave geoms their margins (which bare MJX does not heed: feet then
-lose and find contacts) its overhead was -1 to +4 %; whether the contacts that it keeps are all of the difference was
-not traced. Nothing was measured on a GPU.
+mjx compiled in 16 to 17 s on either side. A run beside other load said +13 % of native with 4 boxes, and a minute later
+it was gone. Nothing was measured on a GPU.
 """
 
 from __future__ import annotations

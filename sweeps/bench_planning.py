@@ -9,15 +9,11 @@ and finds one path, not the field; scipy is timed with its graph already built, 
 apart. Ours starts from class grids and ends with the field and the next step of every arena. Each figure is
 the least of several repeats, taken in turns, so that other load on the machine meets all sides alike.
 
-Measured on 2 virtual cores of an AMD EPYC (AVX-512, 1 MiB L2 a core), jax 0.10.2, numba 0.68.1, two runs with little
-other load and three beside busy processes, which moves the ratios by a third. "x" is the peer's time over ours.
-4,096 maps of 28 x 36, 6.0 to 7.4 us a map: 2.4 to 2.8x pyastar2d, 7.7 to 9.4x Dijkstra, 23 to 28x Dijkstra and its
-graph. 512 maps of 140 x 180, 191 to 216 us: 1.5 to 2.2x, 6.5 to 8.0x, 18 to 21x. One map of 512 x 512: open 1.1 to
-1.2x, rooms 1.2x, maze 0.66 to 0.70x, maze with loops 0.75 to 0.81x, cells thrown at random 1.1x.
-The first call compiles for 4 to 6 s, most of it in Numba.
-Short of their targets: pyastar2d on 28 x 36 (5x) and on 140 x 180 (2x). What a map of 28 x 36 costs on one core,
-pinned: 5.0 us, of which the sweeps 1.5, the costs of its edges about 1.7, and turning maps to batches and back 1.5; and
-1.3 more for threads and copies. On 140 x 180 the edges of 16 maps do not fit the cache.
+Measured on 2 virtual cores of an AMD EPYC (AVX-512, 1 MiB L2 a core), jax 0.10.2, numba 0.68.1, with little other
+load; busy processes move the ratios by a third. "x" is the peer's time over ours.
+4,096 maps of 28 x 36, 3.9 us a map: 6.0x pyastar2d, 22x Dijkstra, 70x Dijkstra and its graph. 512 maps of 140 x 180,
+109 us: 3.7x, 16x, 40x. One map of 512 x 512: open 1.0x, rooms 1.2x, maze 0.67x, maze with loops 0.78x, cells thrown at
+random 1.2x. The first call compiles for 4 to 8 s, most of it in Numba.
 """
 
 from __future__ import annotations
