@@ -8,8 +8,9 @@ memory, in one process on one core, and in two at once. Virtual cores can be two
 be shared with others; no program gains more on a second one than that loop does. All are timed in turns.
 
 Measured on two virtual cores of an AMD EPYC, jax 0.10.2, with little other load: two devices are 2.4 times as fast as
-one by the least of each, 2.1 by the median of rounds (1.3 to 2.5), where the busy loop gains 2.0. They take 0.77 times the
-CPU seconds of one. Beside busy processes the same command said anything from 1.1 to 1.8, and the busy loop 1.0 to 1.4.
+one by the least of each, 2.1 by the median of rounds (1.3 to 2.5), where the busy loop gains 2.0. They take 0.77
+times the CPU seconds of one. Beside busy processes the same command said anything from 1.1 to 1.8, and the busy loop
+1.0 to 1.4.
 """
 
 from __future__ import annotations
