@@ -19,27 +19,43 @@ TILE = 16  # cells and arenas that change places together
 
 
 def turning(lanes: int):
-    """The function `turn(source, row, stride, target, column, step, rows, columns)`, where one of both is `lanes`.
+    """Functions between grids of `lanes` arenas, one after the other, and one grid with a ring and the arenas last.
 
-    `target[column + j * step + i]` becomes `source[row + i * stride + j]` for i below `rows` and j below `columns`.
+    `spread(grids, first, height, width, ringed)` fills all but the ring from the grids of arena `first` and the next;
+    `gather(ringed, grids, first, height, width)` is its inverse.
     """
     tile = min(lanes, TILE)
     transpose = transposition(tile)
 
     @njit(nogil=True)
-    def turn(source, row, stride, target, column, step, rows, columns):
-        if min(rows, columns) < tile:
-            for i in range(rows):
-                for j in range(columns):
-                    target[column + j * step + i] = source[row + i * stride + j]
-            return
-        for down in range(0, rows, tile):
-            i = min(down, rows - tile)  # the last tile overlaps the one before
-            for across in range(0, columns, tile):
-                j = min(across, columns - tile)
-                transpose(source, row + i * stride + j, stride, target, column + j * step + i, step)
+    def spread(grids, first, height, width, ringed):
+        for i in range(height):
+            row, out = (first * height + i) * width, ((i + 1) * (width + 2) + 1) * lanes
+            for lane in range(0, lanes, tile):
+                source = row + lane * height * width
+                if width < tile:
+                    for other in range(tile):
+                        for j in range(width):
+                            ringed[out + j * lanes + lane + other] = grids[source + other * height * width + j]
+                for start in range(0, width if width >= tile else 0, tile):
+                    j = min(start, width - tile)  # the last tile overlaps the one before
+                    transpose(grids, source + j, height * width, ringed, out + j * lanes + lane, lanes)
 
-    return turn
+    @njit(nogil=True)
+    def gather(ringed, grids, first, height, width):
+        for i in range(height):
+            row, out = (first * height + i) * width, ((i + 1) * (width + 2) + 1) * lanes
+            for lane in range(0, lanes, tile):
+                target = row + lane * height * width
+                if width < tile:
+                    for other in range(tile):
+                        for j in range(width):
+                            grids[target + other * height * width + j] = ringed[out + j * lanes + lane + other]
+                for start in range(0, width if width >= tile else 0, tile):
+                    j = min(start, width - tile)
+                    transpose(ringed, out + j * lanes + lane, lanes, grids, target + j, height * width)
+
+    return spread, gather
 
 
 @cache
@@ -53,7 +69,7 @@ def settler(lanes: int, dtype):
     Room to work in: `dtype` [size], float32 [4 * size], int8 [3 * size], with size = `room_size(height, width, lanes)`.
     """
     settle = line_sweep.sweeps(lanes)
-    turn = turning(lanes)
+    spread, gather = turning(lanes)
     kind_of = translation(lanes, CLASSES, Cell.FLOOR)
     straight, oblique = pricing(lanes, oblique=False), pricing(lanes, oblique=True)
 
@@ -76,10 +92,8 @@ def settler(lanes: int, dtype):
                     table[k * lanes + lane] = kinds_of[(first + lane) * CLASSES + k]
                 for k in range(2 * KINDS):
                     price[k * lanes + lane] = prices[(first + lane) * 2 * KINDS + k]
-            for i in range(height):  # of the arenas one after the other, into those with a ring and the arenas last
-                row, ringed = (first * height + i) * width, (i + 1) * line + lanes
-                turn(classes, row, height * width, seen, ringed, lanes, lanes, width)
-                turn(levels, row, height * width, level, ringed, lanes, lanes, width)
+            spread(classes, first, height, width, seen)
+            spread(levels, first, height, width, level)
             for n in range(0, size, lanes):
                 kind_of(seen, table, kind, n)
             cut = cutting[first:]
@@ -97,9 +111,7 @@ def settler(lanes: int, dtype):
             steps[first : first + lanes] = settle(
                 edges + edges, goals[first : first + lanes], cost, 0, height, width, lanes, True
             )
-            for i in range(height):
-                row, ringed = (first * height + i) * width, (i + 1) * line + lanes
-                turn(cost, ringed, lanes, field, row, height * width, width, lanes)
+            gather(cost, field, first, height, width)
 
     return settle_all
 
