@@ -17,6 +17,7 @@ from jaxbiped.config import Model, config_hash
 from jaxbiped.files import new_folder, refuse_existing
 from jaxbiped.mission.eyes import eyes_for
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.recording import FILE, save_log
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.mission.stepped import Mission, run_logged
 from jaxbiped.mission.strategies import STRATEGIES
@@ -77,8 +78,10 @@ def main(args: RunArgs) -> int:
         title = f"{name}, {args.strategy}: {sentence(mission)}"
         save_mission(folder / "map.png", mission.log, title=title)
         save_gif(folder / "mission.gif", mission.log, title=f"{name}, {args.strategy}")
-        (folder / "mission.json").write_text(json.dumps(summary(args, name, mission), indent=2) + "\n")
-    print(f"written {out}: map.png, mission.gif, mission.json")
+        facts = summary(args, name, mission)
+        (folder / "mission.json").write_text(json.dumps(facts, indent=2) + "\n")
+        save_log(folder / FILE, mission.log, facts)
+    print(f"written {out}: map.png, mission.gif, mission.json, {FILE}")
     return 0 if mission.code == Code.REACHED else NOT_REACHED
 
 

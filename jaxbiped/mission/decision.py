@@ -42,6 +42,8 @@ class Thought:
     ij: Int[Array, "B 2"]
     goal_ij: Int[Array, "B 2"]
     pose: Pose  # [B] as believed
+    view: View  # [B N] what was measured
+    evidence: Float[Array, "B H W Z"]  # of the 3D grid, with that view
 
 
 def decide(
@@ -79,7 +81,8 @@ def decide(
     mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, 0, 0, None))(
         mind, view, ij, goal_ij, directions, classes, levels, blind, settings, program
     )
-    return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij, mind.belief.pose)
+    evidence = mind.grid_map.evidence
+    return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij, mind.belief.pose, view, evidence)
 
 
 def perceive(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Float32, Int8, UInt8
+from jaxtyping import Bool, Float, Float32, Int8, UInt8
 
 KINDS = ("obstacle", "bump", "gate")  # of an outline
 MARKS = ("circle", "square")  # of a landmark
@@ -17,6 +17,8 @@ class Outline:
 
     corners_xy: Float[np.ndarray, "4 2"]  # [m] in order around the box
     kind: str  # one of KINDS
+    bottom: float = 0.0  # [m] height of its underside
+    top: float = 0.0  # [m] height of its top
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,14 @@ class Picture:
 
     left: UInt8[np.ndarray, "h w 3"]  # the left camera's image
     disparity: Float32[np.ndarray, "h w"]  # [px]; 0 where nothing was measured
+
+
+@dataclass(frozen=True)
+class Walk:
+    """How a simulated biped moved: `F` states of `physics.robot.robot_spec`, in their order."""
+
+    qpos: Float32[np.ndarray, "F 19"]  # hips (x, y, z) [m], their quaternion (w, x, y, z), 12 joint angles [rad]
+    moment: Float32[np.ndarray, "F"]  # when, in moments of the log: 2.5 is half way from the third to the fourth
 
 
 @dataclass(frozen=True)
@@ -58,11 +68,19 @@ class MissionLog:
     landmarks: tuple[Mark, ...] = ()
     pictures: tuple[Picture, ...] = ()  # T of what the map was measured by last; none where no camera was rendered
     outcome: str = ""  # how it ended, "reached" say
+    true_z: Float[np.ndarray, "T"] | None = None  # [m] height of the ground that the robot stood on
+    squat: Bool[np.ndarray, "T"] | None = None  # its stance
+    points: tuple[Float32[np.ndarray, "_ 3"], ...] = ()  # T clouds [m] that were measured last, world as believed
+    voxels: Bool[np.ndarray, "T H W Z"] | None = None  # occupied; k: (k - 1/2) to (k + 1/2) `level_height`
+    level_height: float = 0.03  # [m]
+    walk: Walk | None = None  # of a biped that was simulated
 
     def __post_init__(self):
         count = len(self.time)
         for name in ("classes", "levels", "true_xyyaw", "estimated_xyyaw", "plan", "action"):
             if len(getattr(self, name)) != count or count == 0:
                 raise ValueError(f"{name} has {len(getattr(self, name))} moments, time has {count}; at least 1 each")
-        if len(self.pictures) not in (0, count):
-            raise ValueError(f"pictures has {len(self.pictures)} moments, time has {count}; as many, or none")
+        for name in ("pictures", "points", "true_z", "squat", "voxels"):
+            held = getattr(self, name)
+            if held is not None and len(held) not in (0, count):
+                raise ValueError(f"{name} has {len(held)} moments, time has {count}; as many, or none")

@@ -11,13 +11,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, UInt32
 
-from jaxbiped import planning
-from jaxbiped.arenas.arena import CIRCLE, Arena
-from jaxbiped.mapping import Cell
+from jaxbiped.arenas.arena import Arena
 from jaxbiped.mission.cycle import cycle
-from jaxbiped.mission.decision import Thought, nearest_direction
+from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.eyes import Eyes
-from jaxbiped.mission.log import Mark, MissionLog, Outline, Picture
+from jaxbiped.mission.log import MissionLog, Picture
+from jaxbiped.mission.moments import marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind, World, start
@@ -106,6 +105,7 @@ class Recorder:
         self.moments: list[dict] = []
         self.pictures: list[Picture] = []
         self.played: list[Played] = []
+        self.walked: list[list[np.ndarray]] = []  # states of a simulated biped, after each decision
         self.action = "Start"
         self.end: World | None = None
 
@@ -115,6 +115,12 @@ class Recorder:
         if shot := self.eyes and self.eyes.picture():
             self.pictures.append(Picture(shot.left, shot.disparity))
         self.command = command
+        self.walked.append([])
+
+    def moved(self, _: int, qpos: Float[np.ndarray, "nq"]) -> None:
+        """A simulated biped is in this state, on its way."""
+        if self.walked:
+            self.walked[-1].append(qpos.astype(np.float32))
 
     def concluded(self, _: int, world: World, mind: Mind) -> None:
         """What came of it."""
@@ -141,7 +147,7 @@ class Recorder:
             last = dict(moments[-1])
             here, time = pose_of(world), float(world.time[0])
             last |= {"true_xyyaw": here, "estimated_xyyaw": mind_pose(self.mind), "time": time, "action": self.action}
-            last["plan"] = np.zeros((0, 2))
+            last |= {"z": float(world.pose.z[0]), "squat": bool(world.squat[0]), "plan": np.zeros((0, 2))}
             moments.append(last)
         else:
             moments.append(nothing(world, self.program))
@@ -162,96 +168,12 @@ class Recorder:
             landmarks=marks(arena),
             pictures=(*self.pictures, *self.pictures[-1:]),
             outcome=code.label,
+            true_z=np.array([m["z"] for m in moments]),
+            squat=np.array([m["squat"] for m in moments]),
+            points=tuple(m["points"] for m in moments),
+            voxels=np.stack([m["voxels"] for m in moments]),
+            level_height=self.program.spec.level_height,
+            walk=walk_of(self.walked),
         )
         played = tuple(self.played)
         return Mission(code, float(world.distance[0]), float(world.time[0]), int(world.measurements[0]), played, log)
-
-
-def moment(world: World, thought: Thought, settings: Settings, program: Program, action: str) -> dict:
-    """What a log keeps of one decision."""
-    return {
-        "classes": np.asarray(thought.classes[0]),
-        "levels": np.asarray(thought.levels[0]),
-        "true_xyyaw": pose_of(world),
-        "estimated_xyyaw": np.array([float(v[0]) for v in (thought.pose.x, thought.pose.y, thought.pose.yaw)]),
-        "plan": planned_way(thought, settings, program),
-        "time": float(world.time[0] + settings.durations.measure),
-        "action": action,
-    }
-
-
-def nothing(world: World, program: Program) -> dict:
-    """The one moment of a mission that ended before it began."""
-    blank = np.zeros(program.spec.shape, np.int8)
-    here = pose_of(world)
-    return {
-        "classes": blank,
-        "levels": blank,
-        "true_xyyaw": here,
-        "estimated_xyyaw": here,
-        "plan": np.zeros((0, 2)),
-        "time": 0.0,
-        "action": "Start",
-    }
-
-
-def pose_of(world: World) -> Float[np.ndarray, "3"]:
-    """True (x, y, yaw) of the only mission of a batch."""
-    return np.array([float(v[0]) for v in (world.pose.x, world.pose.y, world.pose.yaw)])
-
-
-def mind_pose(mind) -> Float[np.ndarray, "3"]:
-    """Believed (x, y, yaw) of the only mission of a batch."""
-    pose = mind.belief.pose
-    return np.array([float(v[0]) for v in (pose.x, pose.y, pose.yaw)])
-
-
-def planned_way(thought: Thought, settings: Settings, program: Program) -> Float[np.ndarray, "n 2"]:
-    """Cell centres [m] of the planned path, from the robot's cell on; empty where there is none."""
-    spec = program.spec
-    moves = np.asarray(way(thought, settings, program)[0])
-    moves = moves[: np.argmax(moves < 0)] if np.any(moves < 0) else moves
-    if len(moves) == 0:
-        return np.zeros((0, 2))
-    cells = np.asarray(thought.ij[0]) + np.vstack(
-        [np.zeros((1, 2), int), np.cumsum(planning.DIRECTIONS[moves], axis=0)]
-    )
-    return (cells[:, ::-1] + 0.5) * spec.pitch
-
-
-@partial(jax.jit, static_argnames=("program",))
-def way(thought: Thought, settings: Settings, program: Program):
-    """Moves of the planned path, as `decide` reads its first."""
-    blind = settings.strategy.blind
-    classes = jnp.where(blind, jnp.int8(Cell.FLOOR), thought.classes)
-    levels = jnp.where(blind, jnp.int8(0), thought.levels)
-    costs, rules = settings.costs.at_pitch(program.spec.pitch), settings.strategy.rules()
-    heading = nearest_direction(thought.pose.yaw[0])[None]
-    length = 3 * sum(program.spec.shape)
-    return planning.next_step(thought.cost, classes, levels, costs, rules, thought.ij, heading, length=length)
-
-
-def outlines(arena: Arena) -> tuple[Outline, ...]:
-    """Footprints of the true boxes."""
-    boxes = jax.device_get(arena.boxes)
-    found = []
-    for m in np.flatnonzero(boxes.used):
-        cos, sin = np.cos(boxes.yaw[m]), np.sin(boxes.yaw[m])
-        local = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [boxes.half_x[m], boxes.half_y[m]]
-        corners = local @ np.array([[cos, sin], [-sin, cos]]) + [boxes.x[m], boxes.y[m]]
-        kind = "gate" if boxes.overhead[m] else "bump" if boxes.top[m] <= 0.0601 else "obstacle"
-        found.append(Outline(corners, kind))
-    return tuple(found)
-
-
-def marks(arena: Arena) -> tuple[Mark, ...]:
-    """The landmarks."""
-    known = jax.device_get(arena.landmarks)
-    return tuple(
-        Mark(
-            (float(known.x[n]), float(known.y[n])),
-            float(known.yaw[n]),
-            "circle" if known.kind[n] == CIRCLE else "square",
-        )
-        for n in np.flatnonzero(known.used)
-    )

@@ -61,6 +61,8 @@ class Observer(Protocol):
 
     def concluded(self, job: int, world: World, mind: Mind, /) -> None: ...
 
+    def moved(self, job: int, qpos: Float[np.ndarray, "nq"], /) -> None: ...
+
 
 def walk(
     arenas: Arena,
@@ -177,6 +179,9 @@ class Walkers:
         ]
         self.stage.play(np.stack(ahead), self.job < self.count)
         self.place += SLICE
+        if self.observer:
+            for s in np.flatnonzero(self.job < self.count):
+                self.observer.moved(int(self.job[s]), np.asarray(self.stage.state.qpos[s]))
 
     def turn(self, ids: Int[np.ndarray, "n"]) -> None:
         """What some robots did is judged; those whose missions go on sense and decide, others take the next jobs."""

@@ -124,7 +124,7 @@ def test_run_writes_its_folder(here, capsys):
     assert cli.main(["run", SCENE, "--out", "mine"]) == 0
     printed = capsys.readouterr().out
     assert "Step-up-bump" in printed and "reached" in printed
-    assert {path.name for path in (here / "mine").iterdir()} == {"map.png", "mission.gif", "mission.json"}
+    assert {path.name for path in (here / "mine").iterdir()} == {"map.png", "mission.gif", "mission.json", "mission.npz"}
     told = json.loads((here / "mine" / "mission.json").read_text())
     assert told["code"] == "reached" and f"{100 * told['distance']:.0f} cm" in printed
 

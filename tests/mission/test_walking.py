@@ -86,6 +86,9 @@ def test_nobody_waits_for_another():
         def concluded(self, *_):
             pass
 
+        def moved(self, *_):
+            pass
+
     watch = Watch()
     play([0, 1], 2, observer=watch)
     second = [k for k, job in enumerate(watch.turns) if job == 1][1]

@@ -1,0 +1,139 @@
+"""The log of a mission as a file: what `jaxbiped view` shows, and what pages are drawn from without playing again.
+
+A compressed `.npz`: arrays of fixed size by the names of `MissionLog`, ragged ones end to end with their lengths,
+pictures as JPEG, and a JSON header with everything else. Points are kept to 1 mm, disparities to 1/64 px.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Num, UInt8
+from PIL import Image
+
+from jaxbiped.errors import InputError
+from jaxbiped.files import write_whole
+from jaxbiped.mission.log import Mark, MissionLog, Outline, Picture, Walk
+
+FORMAT = 1
+FILE = "mission.npz"  # in a results folder
+MILLIMETRE, FAR = 1000.0, 32.0  # [1/m] in which points are written; [m] and how far they may lie
+FRACTION = 64.0  # [1/px] in which disparities are written
+QUALITY = 88  # of JPEG
+WHOLE = ("classes", "levels", "true_xyyaw", "estimated_xyyaw", "time", "origin_xy", "size_xy", "goal_xy")
+OPTIONAL = ("true_z", "squat")
+NAMED = ("pitch", "level_height", "outcome")  # plain values
+
+
+def save_log(path: str | Path, log: MissionLog, facts: Mapping[str, Any] | None = None) -> None:
+    """Write a log as one file, whole or not at all.
+
+    Args:
+      facts: what else is to be known of the mission, as JSON: its config, the scene's name, and so on.
+
+    Raises:
+      InputError: the file cannot be written.
+    """
+    header = {
+        "format": FORMAT,
+        "facts": dict(facts or {}),
+        "action": log.action,
+        "outlines": [vars(each) | {"corners_xy": each.corners_xy.tolist()} for each in log.outlines],
+        "landmarks": [vars(each) for each in log.landmarks],
+        **{name: getattr(log, name) for name in NAMED},
+    }
+    arrays = {name: getattr(log, name) for name in WHOLE}
+    arrays |= {name: getattr(log, name) for name in OPTIONAL if getattr(log, name) is not None}
+    arrays |= ragged("plan", [np.asarray(each, np.float32).reshape(-1, 2) for each in log.plan])
+    if log.points:
+        clouds = [np.clip(each, -FAR, FAR) * MILLIMETRE for each in log.points]
+        arrays |= ragged("points", [np.rint(each).astype(np.int16) for each in clouds])
+    if log.voxels is not None:
+        arrays |= {"voxels": np.packbits(log.voxels, axis=None), "voxels_shape": np.array(log.voxels.shape)}
+    if log.walk is not None:
+        arrays |= {"walk_qpos": log.walk.qpos, "walk_moment": log.walk.moment}
+    if log.pictures:
+        arrays |= ragged("left", [jpeg(each.left) for each in log.pictures])
+        arrays["disparity"] = np.stack([np.rint(each.disparity * FRACTION).astype(np.uint16) for each in log.pictures])
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    write_whole(path, lambda file: np.savez_compressed(file, **arrays))
+
+
+def load_log(path: str | Path) -> tuple[MissionLog, dict[str, Any]]:
+    """A log that `save_log` wrote, and the facts that came with it.
+
+    Raises:
+      InputError: no such file, no log, a damaged one, or one of another format.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+            header = json.loads(arrays["header"].tobytes())
+    except FileNotFoundError:
+        raise InputError("no such file", file=path) from None
+    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile):
+        raise InputError("is no log of a mission, or a damaged one", file=path) from None
+    found = header.get("format") if isinstance(header, dict) else None
+    if found != FORMAT:
+        raise InputError(f"this version reads logs of format {FORMAT}", file=path, field="format", value=found)
+    try:
+        return to_log(header, arrays), header["facts"]
+    except (KeyError, TypeError, ValueError, OSError) as error:
+        raise InputError(f"is a damaged log of a mission: {error}", file=path) from None
+
+
+def to_log(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> MissionLog:
+    """The log of a file's parts."""
+    pictures = ()
+    if "disparity" in arrays:
+        lefts, disparities = pieces(arrays, "left"), arrays["disparity"].astype(np.float32) / np.float32(FRACTION)
+        pictures = tuple(Picture(pixels(left), each) for left, each in zip(lefts, disparities, strict=True))
+    voxels = None
+    if "voxels" in arrays:
+        shape = tuple(int(n) for n in arrays["voxels_shape"])
+        voxels = np.unpackbits(arrays["voxels"], count=int(np.prod(shape))).astype(bool).reshape(shape)
+    walk = Walk(arrays["walk_qpos"], arrays["walk_moment"]) if "walk_qpos" in arrays else None
+    outlines = [Outline(**each | {"corners_xy": np.array(each["corners_xy"])}) for each in header["outlines"]]
+    return MissionLog(
+        **{name: arrays[name] for name in WHOLE},
+        **{name: arrays.get(name) for name in OPTIONAL},
+        **{name: header[name] for name in NAMED},
+        action=tuple(header["action"]),
+        outlines=tuple(outlines),
+        landmarks=tuple(Mark(**each | {"xy": tuple(each["xy"])}) for each in header["landmarks"]),
+        plan=tuple(each.astype(float) for each in pieces(arrays, "plan")),
+        points=tuple((each / MILLIMETRE).astype(np.float32) for each in pieces(arrays, "points")),
+        pictures=pictures,
+        voxels=voxels,
+        walk=walk,
+    )
+
+
+def ragged(name: str, each: Sequence[Num[np.ndarray, "..."]]) -> dict[str, np.ndarray]:
+    """Arrays of different lengths as two: all of them end to end, and their lengths."""
+    return {name: np.concatenate(each), f"{name}_lengths": np.array([len(one) for one in each])}
+
+
+def pieces(arrays: dict[str, np.ndarray], name: str) -> list[np.ndarray]:
+    """What `ragged` put together; none where there is no such name."""
+    if name not in arrays:
+        return []
+    return np.split(arrays[name], np.cumsum(arrays[f"{name}_lengths"])[:-1])
+
+
+def jpeg(image: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "_"]:
+    """A picture as bytes."""
+    buffer = io.BytesIO()
+    Image.fromarray(image).save(buffer, "JPEG", quality=QUALITY)
+    return np.frombuffer(buffer.getvalue(), np.uint8)
+
+
+def pixels(data: UInt8[np.ndarray, "_"]) -> UInt8[np.ndarray, "h w 3"]:
+    """The picture of such bytes."""
+    return np.array(Image.open(io.BytesIO(data.tobytes())).convert("RGB"))
