@@ -56,7 +56,8 @@ def solid_levels(
     """Those of the occupied levels (`columns`) that are no phantoms.
 
     A stereo matcher's phantoms are single clumps of few pixels. So a solid voxel has `params.solid_points` within the
-    patch of about 5 x 5 cm around it (at least its own cell) and another such voxel among its 26 neighbours.
+    patch of about 5 x 5 cm around it (at least its own cell) and another such voxel among its 26 neighbours. Below such
+    a voxel, down to the first gap, `params.below_points` are enough, where that is not None.
     """
     height, width = columns.shape
     aside = int(0.025 / spec.pitch + 1e-6)  # cells on each side that make up the patch
@@ -65,12 +66,21 @@ def solid_levels(
         rows = sum(padded[i : i + height] for i in range(2 * aside + 1))
         evidence = sum(rows[:, j : j + width] for j in range(2 * aside + 1))
     dense = columns & pack(evidence >= params.solid_points, spec)
+    if params.below_points is not None:
+        dense = downwards(dense, columns & pack(evidence >= params.below_points, spec))
     others = dense << 1 | dense >> 1
     around = jnp.pad(dense | others, 1)
     for i, j in itertools.product(range(3), range(3)):
         if (i, j) != (1, 1):
             others = others | around[i : i + height, j : j + width]
     return dense & others
+
+
+def downwards(solid: UInt32[Array, "H W"], through: UInt32[Array, "H W"]) -> UInt32[Array, "H W"]:
+    """`solid`, and the levels of `through` that hang without a gap below one of them."""
+    for reach in (1, 2, 4, 8, 16):
+        solid, through = solid | through & (solid >> reach), through & (through >> reach)
+    return solid
 
 
 def pack(voxels: Bool[Array, "H W Z"], spec: GridSpec) -> UInt32[Array, "H W"]:

@@ -27,6 +27,10 @@ class MapConfig(Model):
     """a voxel with a smaller share of the points of one right above or below is empty: noise leaked out of that one"""
     solid_points: float = Field(150.0, ge=0)
     """a patch of 5 x 5 cm of one level with fewer points bars no way: it may be a phantom, a clump of wild disparity"""
+    below_points: float | None = Field(None, ge=0)
+    """fewer will do in a voxel that hangs without a gap below one that bars the way: the foot of a wall further off,
+    which else would be taken for a gate where only its upper levels have points enough; by default none will (but 50 of
+    rendered stereo)"""
     view_points: float = Field(5.0, ge=0)
     """a cell with fewer points in one view gets no vote from it"""
     fused_points: float = Field(10.0, gt=0)
@@ -44,7 +48,8 @@ class MapConfig(Model):
 
     def params(self) -> MapParams:
         """These thresholds as traced numbers."""
-        return MapParams(**{name: jnp.float32(value) for name, value in self.model_dump().items()})
+        given = self.model_dump()
+        return MapParams(**{name: jnp.float32(value) for name, value in given.items() if value is not None})
 
 
 @jax.tree_util.register_dataclass
@@ -63,3 +68,4 @@ class MapParams:
     refit_offset: Float[Array, ""]
     refit_inlier: Float[Array, ""]
     refit_points: Float[Array, ""]
+    below_points: Float[Array, ""] | None = None  # None: the rule is left out of the program

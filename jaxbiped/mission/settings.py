@@ -31,6 +31,7 @@ from jaxbiped.sensing.presets import PRESETS, sensor_preset
 MAX_RADIUS = 0.15
 SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinematic`: a walking biped sways, and its
 # stereo camera, as wide as the body, sweeps 12 cm to either side
+BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
 SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 
 # Bounded so that sums of costs along a path keep their differences in single precision.
@@ -102,10 +103,14 @@ class MissionConfig(Model):
     @pydantic.model_validator(mode="before")
     @classmethod
     def _fill_in(cls, data):
-        """What is not given comes from the preset, field by field; the radius depends on who walks."""
+        """What is not given comes from the preset, field by field; the radius depends on who walks, the rule of
+        walls on what it sees with."""
         if isinstance(data, dict) and data.get("executor", "kinematic") != "kinematic":
             robot = data.get("robot", {})
             data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
+        if isinstance(data, dict) and data.get("sensor") == "stereo":
+            rules = data.get("mapping", {})
+            data = data | {"mapping": {"below_points": BELOW_POINTS} | rules if isinstance(rules, dict) else rules}
         try:
             preset = sensor_preset(data.get("preset", "rendered"))
         except (InputError, AttributeError, TypeError):

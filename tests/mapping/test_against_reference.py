@@ -51,6 +51,7 @@ def random_params(rng):
     config = MapConfig(
         **few_points,
         solid_points=rng.choice([0.0, 20.0, 100.0]),
+        below_points=rng.choice([10.0, 50.0, 300.0]),
         voxel_share=rng.choice([0, 0.05, 0.5]),
         head_margin=rng.choice([0, 0.02]),
     )

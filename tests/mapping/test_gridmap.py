@@ -183,3 +183,28 @@ def test_one_cell():
     grid_map = LOOK(empty(spec), view(plane((0, 0.05), (0, 0.05), 0.03)), ORIGIN, BODY, PARAMS, spec=spec, refit=False)
     classes, levels = READ(grid_map, PARAMS, spec=spec)
     assert classes.tolist() == [[Cell.BUMP]] and levels.tolist() == [[1]]
+
+
+def far_wall(points):
+    """A wall whose upper levels have points enough to bar the way, and whose lower ones have some."""
+    lower, upper = wall((0.92, 0.92), (0.3, 0.7), (0.045, 0.345)), wall((0.92, 0.92), (0.3, 0.7), (0.345, 0.5))
+    grid_map = empty(SPEC)
+    for part, weight in ((FLOOR, 16.0), (lower, 4.0), (upper, 16.0)):  # 15 points a voxel: 60 and 240 pixels
+        grid_map = LOOK(grid_map, view(part, weight), ORIGIN, BODY, points, spec=SPEC, refit=False)
+    again = LOOK(grid_map, view(FLOOR, 64.0), ORIGIN, BODY, points, spec=SPEC, refit=False)
+    return np.asarray(READ(again, points, spec=SPEC)[0])[cells((0.85, 0.95), (0.35, 0.65))]
+
+
+def test_the_foot_of_a_far_wall_is_no_gate():
+    assert (far_wall(PARAMS) == Cell.GATE).all()
+    assert (far_wall(replace(PARAMS, below_points=jnp.float32(50))) == Cell.OBSTACLE).all()
+
+
+def test_what_hangs_free_stays_a_gate():
+    """Few points below a lintel, and a gap between: the rule for walls leaves it alone."""
+    params = replace(PARAMS, below_points=jnp.float32(50))
+    stray = wall((0.92, 0.92), (0.3, 0.7), (0.20, 0.29))
+    grid_map = empty(SPEC)
+    for part, weight in ((np.concatenate(gate(0.37)), 16.0), (stray, 4.0), (FLOOR, 64.0)):
+        grid_map = LOOK(grid_map, view(part, weight), ORIGIN, BODY, params, spec=SPEC, refit=False)
+    assert (np.asarray(READ(grid_map, params, spec=SPEC)[0])[cells((0.85, 1.0), (0.35, 0.65))] == Cell.GATE).all()

@@ -82,6 +82,12 @@ def solid_levels(voxels, evidence, params, spec):
     patch = sum(padded[i : i + height, j : j + width] for i in sides for j in sides)
     dense = (voxels & (patch >= params.solid_points))[..., -spec.lowest :]
     dense[..., 0] |= (voxels & (patch >= params.solid_points))[..., : 1 - spec.lowest].any(-1)
+    if params.below_points is not None:
+        enough = voxels & (patch >= params.below_points)
+        through = enough[..., -spec.lowest :].copy()
+        through[..., 0] |= enough[..., : 1 - spec.lowest].any(-1)
+        for level in range(dense.shape[-1] - 2, -1, -1):
+            dense[..., level] |= through[..., level] & dense[..., level + 1]
     padded = np.pad(dense, 1)
     around = sum(
         padded[i : i + height, j : j + width, k : k + dense.shape[-1]].astype(int)
