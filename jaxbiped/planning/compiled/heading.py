@@ -1,0 +1,91 @@
+"""Time to go over (cell, heading) by Dijkstra's method, compiled for a CPU, one arena after the other, in float64."""
+
+from __future__ import annotations
+
+import heapq
+from functools import cache
+from threading import Lock
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numba import carray, njit
+
+from jaxbiped.planning.compiled import foreign
+from jaxbiped.planning.costs import DIRECTIONS
+
+DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
+NAME = "jaxbiped_heading_dijkstra"
+LOCK = Lock()
+
+
+@njit(nogil=True)
+def settle(time, face, turn, goal_i, goal_j, height, width, cost):
+    """One arena: `time` and `face` [8 * H * W] flat; `cost` [8 * H * W] is written."""
+    cells = height * width
+    cost[:] = np.inf
+    heap = [(0.0, 0)]
+    heap.pop()
+    if 0 <= goal_i < height and 0 <= goal_j < width:
+        for h in range(8):
+            cost[h * cells + goal_i * width + goal_j] = 0.0
+            heap.append((0.0, h * cells + goal_i * width + goal_j))
+    while heap:
+        so_far, state = heapq.heappop(heap)
+        if so_far > cost[state]:
+            continue
+        h, n = state // cells, state % cells
+        for other in ((h + 1) % 8, (h + 7) % 8):
+            before, total = other * cells + n, so_far + turn
+            if total < cost[before]:
+                cost[before] = total
+                heapq.heappush(heap, (total, before))
+        i, j = n // width, n % width
+        for k in ((h + 7) % 8, h, (h + 1) % 8):
+            a, b = i - DI[k], j - DJ[k]  # from where a move in direction k leads here
+            if 0 <= a < height and 0 <= b < width and face[k * cells + a * width + b] == h:
+                before, total = h * cells + a * width + b, so_far + time[k * cells + a * width + b]
+                if total < cost[before]:
+                    cost[before] = total
+                    heapq.heappush(heap, (total, before))
+
+
+@njit(nogil=True)
+def solve(arguments, count, results):
+    """All arenas, as `foreign.register` wants it."""
+    dims = foreign.shape(arguments, 0)
+    batch, height, width = np.int64(dims[0]), np.int64(dims[2]), np.int64(dims[3])
+    size = 8 * height * width
+    time = foreign.array(arguments, 0, batch * size, np.float32)
+    face = foreign.array(arguments, 1, batch * size, np.int8)
+    turn = foreign.array(arguments, 2, batch, np.float32)
+    goals = carray(foreign.pointer(foreign.data(arguments, 3)), (batch, 2), np.int32)
+    field = foreign.array(results, 0, batch * size, np.float32)
+    cost = np.empty(size)
+    for arena in range(batch):
+        part = slice(arena * size, (arena + 1) * size)
+        settle(time[part], face[part], float(turn[arena]), goals[arena, 0], goals[arena, 1], height, width, cost)
+        field[part] = cost
+
+
+@cache
+def registered() -> str:
+    """The name by which XLA knows the kernel; compiled at the first call."""
+    foreign.register(NAME, solve)
+    return NAME
+
+
+def settle_headings(time, face, turn, goal_ij):
+    """Least time [B, 8, H, W] float32 from each heading and cell to the goal, in any heading there.
+
+    Args:
+      time: of moves out of each cell in each direction, without the turn to `face`; float32 [B, 8, H, W], none NaN or
+        negative.
+      face: the heading in which each is made, at most one eighth off its direction; int8 [B, 8, H, W].
+      turn: of one eighth, float32 [B], not negative.
+      goal_ij: [B, 2]; nothing is reached from one outside the grid.
+    """
+    with LOCK:
+        name = registered()
+    result = jax.ShapeDtypeStruct(time.shape, jnp.float32)
+    return jax.ffi.ffi_call(name, result)(time, face, turn, goal_ij.astype(jnp.int32))

@@ -1,0 +1,104 @@
+"""What moves over (cell, heading) take: the times of the primitives, and of the measurements between them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int, Int8
+
+from jaxbiped.planning.costs import (
+    BASE_PITCH,
+    DIRECTIONS,
+    FORBIDDEN,
+    IN_GATE,
+    STEP,
+    UNMEASURED,
+    Rules,
+    cell_kinds,
+    move_kind,
+)
+from jaxbiped.planning.heading.crossing import beside, crossing_faces
+
+LEAST = 0.05  # [s] that a move takes at least: a way must come nearer to its goal with each cell
+REACH = math.sqrt(2.0)  # [cells of 5 cm] that a step over an edge carries the robot forward, at most
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Times:
+    """What the motions take [s] (paper, Table 2, and a measurement); scalars, or one an arena. All traced."""
+
+    straight: Float[Array, "*B"] | float = 16.0  # 5 cm forward
+    turn: Float[Array, "*B"] | float = 5.0  # 45 degrees
+    step_up: Float[Array, "*B"] | float = 96.0  # one level
+    step_down: Float[Array, "*B"] | float = 96.0
+    pass_gate: Float[Array, "*B"] | float = 48.0  # 5 cm forward, squatting; getting down and up is in it
+    measure: Float[Array, "*B"] | float = 10.0  # after each primitive
+    unmeasured: Float[Array, "*B"] | float = 800.0  # what 5 cm into the unmeasured are feared to cost: C4 at 8 s a unit
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Moves:
+    """Moves out of each cell in each of `DIRECTIONS`."""
+
+    time: Float[Array, "B 8 H W"]  # [s] without the turn to `face`; inf: forbidden
+    face: Int8[Array, "B 8 H W"]  # the direction that the robot faces from then on: the move's own, but for edges
+
+
+def heading_moves(
+    classes: Int[Array, "B H W"],
+    levels: Int[Array, "B H W"],
+    times: Times,
+    rules: Rules,
+    pitch: float = BASE_PITCH,
+    extra: Float[Array, "B 8 H W"] | None = None,
+) -> Moves:
+    """The moves that Eq. 1 knows, in the seconds that the mission's clock counts for them (`motion.duration`).
+
+    A move is a decision: what its primitive takes, and a measurement. On pitches below 5 cm several moves in line are
+    one primitive, and share its measurement. Precedence is that of Eq. 1 (`costs.move_kind`): an end unmeasured, then a
+    step, then an end in a gate. Over an edge the robot faces square to it (`crossing_faces`), and stays so; a step
+    carries it forward, and what the move leads to the side of that is walked. Before the unmeasured it looks once more.
+
+    Deviations from the clock: yaws are multiples of 45 degrees and places are cells; a primitive that crosses an edge
+    on a fine pitch carries the robot over several cells, here over one.
+
+    Args:
+      times, rules: leaves are scalars or [B]; none of the times negative or NaN.
+      pitch: static [m].
+      extra: [s] to be added to each move, not below 0.
+    """
+
+    def each(leaf):
+        return jnp.asarray(leaf, jnp.float32).reshape(-1, 1, 1) if jnp.ndim(leaf) else jnp.asarray(leaf, jnp.float32)
+
+    t = jax.tree.map(each, times)
+    allowed = jax.tree.map(lambda leaf: jnp.asarray(leaf).reshape(-1, 1, 1) if jnp.ndim(leaf) else leaf, rules)
+    kinds = cell_kinds(classes, allowed)
+    share = t.measure / max(1, round(BASE_PITCH / pitch))
+    faces = crossing_faces(classes, levels, pitch)
+    time, face = [], []
+    for k in range(8):
+        di, dj = (int(d) for d in DIRECTIONS[k])
+        there, ground = beside(kinds, di, dj, FORBIDDEN), beside(levels, di, dj, 0)
+        sides = (beside(kinds, di, 0, FORBIDDEN), beside(kinds, 0, dj, FORBIDDEN)) if di and dj else None
+        kind = move_kind((kinds, levels), (there, ground), sides, allowed.corner_cutting)
+        cells = math.hypot(di, dj) * pitch / BASE_PITCH
+        askew = faces[:, k] != k
+        ahead, aside = (jnp.where(askew, cells * math.sqrt(0.5), value) for value in (cells, 0.0))
+        rise = ground.astype(jnp.int16) - levels.astype(jnp.int16)
+        step = jnp.where(rise > 0, t.step_up, t.step_down)
+        seconds = t.straight * cells + share
+        seconds = jnp.where(kind == IN_GATE, t.pass_gate * cells + share, seconds)
+        beyond = (jnp.maximum(ahead - REACH, 0.0) + aside) * t.straight
+        seconds = jnp.where(kind == STEP, step + beyond + t.measure, seconds)
+        feared = t.straight * cells + share + t.measure + t.unmeasured * (pitch / BASE_PITCH)
+        seconds = jnp.maximum(jnp.where(kind == UNMEASURED, feared, seconds), LEAST)
+        time.append(jnp.where(kind == FORBIDDEN, jnp.inf, seconds))
+        face.append(jnp.where(kind == STEP, faces[:, k], jnp.int8(k)))
+    time = jnp.stack(time, axis=1)
+    return Moves(time if extra is None else time + extra, jnp.stack(face, axis=1))
