@@ -30,6 +30,7 @@ COMMANDS = {
     "primitives": ("primitives", "PrimitivesArgs", "verify the motion primitives in simulation", False),
     "tune": ("tune", "TuneArgs", "tune the costs on random arenas, and judge them on others", True),
     "fit-sensor": ("fit_sensor", "FitSensorArgs", "fit the noise of the ray-cast sensor to rendered pairs", False),
+    "reproduce": ("reproduce", "ReproduceArgs", "repeat the paper, its figures and ours on one page", False),
     "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
 }
 # What a command is when its first argument is a results folder: another module, other options.

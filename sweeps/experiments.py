@@ -8,7 +8,6 @@ those that reached the goal.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -26,34 +25,15 @@ from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.evaluate import run_all, run_one_by_one
+from jaxbiped.study.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.study.walks import walk_all
 
 SCENES = Path(__file__).parent.parent / "configs" / "scenes"
 
 
-@dataclass(frozen=True)
-class Experiment:
-    """One row: how it is run, and what the paper measured."""
-
-    number: int
-    strategy: str
-    distance: float | None = None  # [m] (paper, Table 3)
-    minutes: float | None = None  # (paper, Tables 3 and 4)
-
-
-EXPERIMENTS = (
-    Experiment(1, "full"),
-    Experiment(2, "full"),
-    Experiment(3, "full", None, 16.8),
-    Experiment(4, "floor_only", 1.33, 17.0),
-    Experiment(5, "full", 0.85, 10.0),
-    Experiment(6, "full", None, 9.2),
-)
-
-
 def play(item: Experiment, config: MissionConfig, seeds: int):
     """All missions of one experiment, at once: `Result` with leaves [seeds]."""
-    _, arena = load_scene(SCENES / f"experiment_{item.number}.toml")
+    _, arena = load_scene(SCENES / f"{item.scene}.toml")
     static = program(config, tuple(round(float(v), 6) for v in arena.size_xy))
     batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (seeds, *jnp.shape(leaf))), arena)
     noise = jnp.stack([from_key(jax.random.key(seed)) for seed in range(seeds)])

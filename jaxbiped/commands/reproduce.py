@@ -1,0 +1,121 @@
+"""`jaxbiped reproduce`: the paper's experiments again, our figures beside the paper's, on one page."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+import jax
+import pydantic
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from jaxbiped.arenas import Arena
+from jaxbiped.config import Model, config_hash
+from jaxbiped.files import refuse_existing
+from jaxbiped.mission.settings import SIMULATED, MissionConfig
+from jaxbiped.report.reproduction.files import write
+from jaxbiped.report.reproduction.page import answer
+from jaxbiped.study import store
+from jaxbiped.study.reproduction import EXPERIMENTS, PUBLISHED, fit_measuring
+from jaxbiped.study.reproduction.findings import Findings
+from jaxbiped.study.reproduction.gather import MISSIONS, experiment, lintel, mishaps, shortest, strategies
+from jaxbiped.study.reproduction.staging import load_scenes, seeing
+from jaxbiped.study.reproduction.table_1 import SCENES
+
+
+class ReproduceArgs(Model):
+    """Repeat the paper's experiments and write one page: its Tables 1 to 4 with our figures beside the paper's, the
+    reasons where they differ, pictures after its figures, and the population behind its example.
+    """
+
+    scenes: Path = Path("configs/scenes")
+    """Folder with the scenes of the experiments and of Table 1."""
+    seed: Annotated[int, pydantic.Field(ge=0, lt=2**31)] = 0
+    """Of all noise; repeats take the next ones."""
+    repeats: Annotated[int, pydantic.Field(ge=1, le=1000)] = 5
+    """Missions of each experiment; the one with the median time is shown."""
+    sensor: Literal["stereo", "raycast", "oracle"] = "stereo"
+    """What the missions of the scenes see with."""
+    executor: Literal["native", "mjx", "sampled", "kinematic"] = "native"
+    """How they move."""
+    out: Path | None = None
+    """Folder to write, which must not exist. Default: results/reproduce-<hash of these options>."""
+
+
+def main(args: ReproduceArgs) -> int:
+    """Run the command.
+
+    Returns:
+      Exit status 0, however the missions end: the page says it.
+
+    Raises:
+      InputError: no scenes, nothing to render with, a biped that cannot be simulated, a folder that exists or cannot
+        be written.
+    """
+    out = args.out or Path("results") / f"reproduce-{config_hash(args.model_copy(update={'out': None}))}"
+    refuse_existing(out)
+    config = MissionConfig(sensor=args.sensor, executor=args.executor)
+    arenas = load_scenes(args.scenes, (*(item.scene for item in EXPERIMENTS), *SCENES))
+    if config.executor in SIMULATED:
+        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+
+        rehearse(config)
+    console, began = Console(), time.perf_counter()
+    found = gather(args, arenas, config, console)
+    facts = {
+        "Seed": str(args.seed),
+        "Wall time": f"{time.perf_counter() - began:.0f} s",
+        "Device": jax.devices()[0].platform,
+        "Versions": ", ".join(f"{name} {version}" for name, version in store.versions().items()),
+    }
+    files = write(out, found, args.model_dump(mode="json"), facts, shlex.join(["jaxbiped", *sys.argv[1:]]))
+    for sentence in answer(found):
+        console.print(sentence, highlight=False)
+    console.print(f"written {out}: {', '.join(files)}", highlight=False)
+    return 0
+
+
+def gather(args: ReproduceArgs, arenas: dict[str, Arena], config: MissionConfig, console: Console) -> Findings:
+    """Play everything."""
+    seeds = range(args.seed, args.seed + args.repeats)
+    of_table_1, of_mishaps, of_repeat = MISSIONS
+    played = {}
+    with seeing(config) as eyes:
+        with stage(console, "experiments", of_repeat * args.repeats) as done:
+            for item in EXPERIMENTS:
+                played[item.number] = experiment(item, arenas[item.scene], config, seeds, eyes, done)
+        with stage(console, "Table 1", of_table_1) as done:
+            table_1 = strategies(arenas, config, args.seed, eyes, done)
+    with stage(console, "what cannot work", of_mishaps) as done:
+        endings = mishaps(args.sensor, args.seed, done)
+    records, shown, logs = ({number: some[k] for number, some in played.items()} for k in range(3))
+    fit = fit_measuring([each for some in records.values() for each in some], PUBLISHED, shown)
+    return Findings(
+        default=config.durations.measure,
+        experiments=records,
+        shown=shown,
+        logs=logs,
+        shortest={item.number: shortest(arenas[item.scene], config, item.strategy) for item in EXPERIMENTS},
+        gate_depth=max(lintel(arenas[item.scene]) for item in EXPERIMENTS),
+        radius=config.robot.radius,
+        fit=fit,
+        table_1=table_1,
+        endings=endings,
+    )
+
+
+@contextmanager
+def stage(console: Console, name: str, total: int) -> Iterator[Callable[[], None]]:
+    """A part of the command: a bar on a terminal, and how long it took."""
+    began = time.perf_counter()
+    columns = TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task(name, total=total)
+        yield lambda: bar.advance(task)
+    console.print(f"{name}: {total} in {time.perf_counter() - began:.0f} s", highlight=False)

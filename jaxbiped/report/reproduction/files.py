@@ -1,0 +1,87 @@
+"""What the reproduction writes: its page, all figures as JSON and Parquet, and the logs of the missions shown."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from jaxbiped.files import new_folder, write_whole
+from jaxbiped.report.reproduction.page import PAGE, answer, build
+from jaxbiped.study.reproduction.account import Record
+from jaxbiped.study.reproduction.findings import Findings
+from jaxbiped.study.reproduction.paper import EXPERIMENTS
+
+FIGURES, MISSIONS = "reproduction.json", "missions.parquet"
+
+
+def write(out: Path, found: Findings, args: dict[str, Any], facts: dict[str, str], command: str) -> list[str]:
+    """Write a folder that must not exist; the names of its files.
+
+    Raises:
+      InputError: it exists, or cannot be written.
+    """
+    fidelity = f"sensor {args['sensor']}, executor {args['executor']}"
+    page = build(found, seed=args["seed"], fidelity=fidelity, facts=facts, commands=(command,), config=args)
+    texts = {PAGE: page, FIGURES: json.dumps(figures(found) | {"command": command, "facts": facts}, indent=2) + "\n"}
+    with new_folder(out) as folder:
+        for name, text in texts.items():
+            write_whole(folder / name, saver(text.encode()))
+        buffer = io.BytesIO()
+        missions(found).write_parquet(buffer)
+        write_whole(folder / MISSIONS, saver(buffer.getvalue()))
+    return [*texts, MISSIONS]
+
+
+def saver(data: bytes) -> Callable[[Any], object]:
+    """How to write bytes into an open file."""
+    return lambda file: file.write(data)
+
+
+def figures(found: Findings) -> dict[str, Any]:
+    """Everything that the page says, as JSON."""
+    return {
+        "answer": answer(found),
+        "measure": {"default": found.default, "fitted": dataclasses.asdict(found.fit) if found.fit else None},
+        "experiments": [
+            {
+                "number": item.number,
+                "paper": {"distance": item.distance, "minutes": item.minutes, "straight": item.straight},
+                "shortest": found.shortest.get(item.number),
+                "shown": mission(found.shown[item.number], found),
+                "missions": [mission(each, found) for each in found.experiments[item.number]],
+            }
+            for item in EXPERIMENTS
+        ],
+        "table_1": [
+            {"strategy": strategy, "scene": scene, **dataclasses.asdict(each)}
+            for (strategy, scene), each in found.table_1.items()
+        ],
+        "table_2": [dataclasses.asdict(each) for each in found.table_2],
+        "what_cannot_work": [
+            {"name": each.mishap.name, "code": each.mission.code.label, "named": each.named} for each in found.endings
+        ],
+    }
+
+
+def mission(each: Record, found: Findings) -> dict[str, Any]:
+    """One mission of an experiment."""
+    row = dataclasses.asdict(each) | {"code": each.code.label}
+    return row | {"time": each.time(found.measure), "time_at_default": each.time(found.default)}
+
+
+def missions(found: Findings) -> pl.DataFrame:
+    """A row for each mission of the experiments, and each kind of action."""
+    rows = []
+    for records in found.experiments.values():
+        for each in records:
+            row = mission(each, found)
+            for kind, part in row.pop("parts").items():
+                row |= {f"{kind.replace(' ', '_')}_{name}": value for name, value in part.items()}
+            rows.append(row)
+    return pl.DataFrame(rows)
