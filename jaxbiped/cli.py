@@ -32,6 +32,7 @@ COMMANDS = {
     "fit-sensor": ("fit_sensor", "FitSensorArgs", "fit the noise of the ray-cast sensor to rendered pairs", False),
     "reproduce": ("reproduce", "ReproduceArgs", "repeat the paper, its figures and ours on one page", False),
     "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
+    "view": ("view", "ViewArgs", "show missions in the browser", False),
 }
 # What a command is when its first argument is a results folder: another module, other options.
 ON_FOLDERS = {"compare": ("stored", "StoredArgs")}

@@ -1,0 +1,55 @@
+"""A mission that is shown: its log, and what else the viewer has to know of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jaxbiped.config import parse
+from jaxbiped.errors import InputError
+from jaxbiped.mission.log import MissionLog
+from jaxbiped.mission.recording import load_log
+from jaxbiped.mission.settings import MissionConfig
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One mission."""
+
+    log: MissionLog
+    config: MissionConfig
+    title: str  # the arena's name and the strategy
+    ending: str  # how it went, in a sentence
+    note: str = ""  # what else is to be said
+
+
+def shown(path: Path) -> Shown:
+    """The mission of a file that `mission.recording.save_log` wrote.
+
+    Raises:
+      InputError: no log, a damaged one, or one whose config this version does not know.
+    """
+    log, facts = load_log(path)
+    config = config_of(facts, path)
+    title = ", ".join(str(facts[name]) for name in ("scene", "strategy") if name in facts) or path.stem
+    seed = f", seed {facts['seed']}" if "seed" in facts else ""
+    note = f"sensor {config.sensor}, executor {config.executor}{seed}"
+    return Shown(log, config, title, ending(log, facts), note)
+
+
+def config_of(facts: Mapping[str, Any], path: Path) -> MissionConfig:
+    """The mission's config; the default where the file has none."""
+    try:
+        return parse(MissionConfig, facts.get("config", {}), file=path)
+    except InputError as error:
+        raise InputError(f"was written by another version: {error}", file=path) from None
+
+
+def ending(log: MissionLog, facts: Mapping[str, Any]) -> str:
+    """How a mission went, for people."""
+    outcome = log.outcome.replace("_", " ") or "not ended"
+    measured = f", {facts['measurements']} measurements" if "measurements" in facts else ""
+    walked = f"{100 * facts['distance']:.0f} cm in " if "distance" in facts else ""
+    return f"{outcome}: {walked}{log.time[-1]:.0f} s ({log.time[-1] / 60:.1f} min){measured}"
