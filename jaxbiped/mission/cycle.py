@@ -9,10 +9,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.geometry.pose import Pose
+from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mission.decision import Thought, climbed, decide
 from jaxbiped.mission.executors import EXECUTORS, Execution
 from jaxbiped.mission.footing import walked
+from jaxbiped.mission.localising import carried_on, unmarked
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
@@ -97,6 +98,8 @@ def sense(
         )
     else:
         raise ValueError(f"the sensor {program.sensor} measures on the host: its missions are given what they see")
+    if program.localisation != "landmarks":
+        return view, unmarked(view, world, mind, arena, settings, program, seed)
     return view, landmarks.sight(
         arena, pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
     )
@@ -132,6 +135,7 @@ def conclude(
     code = jnp.where(~stays & executed.outside, Code.OUT_OF_BOUNDS, code)
     code = jnp.where(~stays & executed.fell, Code.FELL, code)
     code = jnp.where(~stays & executed.collided, Code.COLLIDED, code)
+    astray = jnp.hypot(belief.pose.x - pose.x, belief.pose.y - pose.y)
     sane = jnp.isfinite(away + time + pose.yaw + belief.pose.x + belief.pose.y + belief.pose.yaw)
     code = jnp.where(sane, code, Code.INVALID).astype(jnp.int32)
     world = World(
@@ -143,5 +147,9 @@ def conclude(
         decisions=decisions,
         code=code,
         seed=world.seed,
+        pose_error=astray,
+        yaw_error=jnp.abs(wrap_angle(belief.pose.yaw - pose.yaw)),
+        before=None if world.before is None else world.pose,
     )
-    return world, replace(walked(mind, command, executed.moved, executed.variances), belief=belief)
+    mind = carried_on(walked(mind, command, executed.moved, executed.variances), executed.moved, executed.variances)
+    return world, replace(mind, belief=belief)

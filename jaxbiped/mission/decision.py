@@ -17,6 +17,7 @@ from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.footing import place_feet
 from jaxbiped.mission.goal import goal_cell
+from jaxbiped.mission.localising import localise
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
@@ -24,7 +25,6 @@ from jaxbiped.motion.approach import foresight
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
 from jaxbiped.planning.rims import rim_costs
-from jaxbiped.sensing.localisation import correct
 from jaxbiped.sensing.view import Sightings, View
 
 LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is known
@@ -89,7 +89,7 @@ def perceive(
     mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program
 ) -> tuple[Mind, Int[Array, "B H W"], Int[Array, "B H W"], Int[Array, "B 2"]]:
     """Each robot after a measurement: its mind, the classed map, and its cell."""
-    mind = replace(mind, belief=jax.vmap(correct)(mind.belief, arena.landmarks, sightings))
+    mind = jax.vmap(localise, in_axes=(0, 0, 0, None))(mind, sightings, arena.landmarks, program)
     mind = begin_maps(mind, settings, program.spec)
     return jax.vmap(read_map, in_axes=(0, 0, 0, None))(mind, view, settings, program)
 

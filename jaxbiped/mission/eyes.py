@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, UInt32
+from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.cycle import SENSE
-from jaxbiped.mission.settings import MissionConfig, Settings
+from jaxbiped.mission.settings import VISUAL, MissionConfig, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.sensing.camera import CameraConfig, Mount, mount, placed
 from jaxbiped.sensing.hashing import fold
@@ -50,14 +53,22 @@ class Eyes(Protocol):
 class StereoEyes:
     """The sensor `stereo` for the robots of one process; to be used, and closed, in the thread that made it."""
 
-    def __init__(self, camera: CameraConfig):
+    def __init__(self, camera: CameraConfig, localisation: str = "landmarks"):
         """
+        Args:
+          localisation: how robots know where they stand; arenas have landmarks only where it is by these.
+
         Raises:
           InputError: nothing can be rendered on this machine.
         """
         from jaxbiped.sensing.stereo.measure import StereoSensor  # loads MuJoCo, and how it renders
 
         self.sensor = StereoSensor(camera)
+        self.marked, self.tracker = localisation == "landmarks", None
+        if localisation in VISUAL:
+            from jaxbiped.sensing.stereo.tracking import Tracker
+
+            self.tracker = Tracker(self.sensor.rig)
         self.last: Shot | None = None
 
     def see(
@@ -72,12 +83,19 @@ class StereoEyes:
         """See `Eyes`; padding gets what the last row before it gets."""
         placing = jax.device_get((where(world, mind, settings, carriage), mind.belief.pose, settings.stereo.max_range))
         arena, spread = jax.device_get((arena, settings.landmarks))
+        if not self.marked:
+            arena = replace(arena, landmarks=replace(arena.landmarks, used=np.zeros_like(arena.landmarks.used)))
+        names = jax.device_get(view_names(world, mind)) if self.tracker else None
         seen = []
         for k in range(count or len(world.code)):
             one, spread_one, (eye, believed, max_range) = jax.tree.map(lambda v, k=k: v[k], (arena, spread, placing))
             origin, basis, at, seed = eye
             self.last = self.sensor(one, origin, basis, at, believed, float(max_range), spread_one, int(seed))
-            seen.append((self.last.view, self.last.sightings))
+            sightings = self.last.sightings
+            if self.tracker:
+                now, then = (self.sensor.shown + row[k].tobytes() for row in names)
+                sightings = replace(sightings, motion=self.tracker(self.last, at, now, then))
+            seen.append((self.last.view, sightings))
         seen += seen[-1:] * (len(world.code) - len(seen))
         return jax.tree.map(lambda *rows: np.stack(rows), *seen)
 
@@ -92,7 +110,7 @@ class StereoEyes:
 
 def eyes_for(config: MissionConfig) -> StereoEyes | None:
     """What a mission of this config sees with on the host; None where its sensor is JAX."""
-    return StereoEyes(config.camera) if config.sensor in RENDERED else None
+    return StereoEyes(config.camera, config.localisation) if config.sensor in RENDERED else None
 
 
 def try_eyes(config: MissionConfig) -> None:
@@ -103,6 +121,25 @@ def try_eyes(config: MissionConfig) -> None:
     """
     if eyes := eyes_for(config):
         eyes.close()
+
+
+@jax.jit
+def view_names(world: World, mind: Mind) -> tuple[UInt32[Array, "B 6"], UInt32[Array, "B 6"]]:
+    """What tells this view of each robot from all others of its arena, and what told the view before it; zeros before
+    the first. Views of two missions that have the same name are the same."""
+
+    def name(pose: Pose, decision: Int[Array, ""], look: Bool[Array, ""], squat: Bool[Array, ""], seed) -> Array:
+        held = 2 * look.astype(jnp.uint32) + squat.astype(jnp.uint32)
+        place = jax.lax.bitcast_convert_type(jnp.stack([pose.x, pose.y, pose.yaw]).astype(jnp.float32), jnp.uint32)
+        return jnp.concatenate([place, jnp.stack([decision.astype(jnp.uint32), held, seed])])
+
+    def one(world: World, mind: Mind):
+        anchor = mind.anchor
+        then = name(world.before, world.decisions - 1, anchor.look, anchor.squat, world.seed)
+        now = name(world.pose, world.decisions, mind.look, world.squat, world.seed)
+        return now, jnp.where(anchor.some, then, jnp.uint32(0))
+
+    return jax.vmap(one)(world, mind)
 
 
 @jax.jit

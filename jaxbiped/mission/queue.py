@@ -51,6 +51,21 @@ class Result:
     measurements: Int[Array, "N"]
     decisions: Int[Array, "N"]
     goal_distance: Float[Array, "N"]  # [m] from the goal, at the end
+    pose_error: Float[Array, "N"]  # [m] from where the robot believed to stand, at the end
+    yaw_error: Float[Array, "N"]  # [rad] the same of its yaw
+
+
+def ending(world: World, goal_xy: Float[Array, "*N 2"]) -> Result:
+    """How missions ended whose worlds these are, in arenas with these goals."""
+    away = jnp.hypot(goal_xy[..., 0] - world.pose.x, goal_xy[..., 1] - world.pose.y)
+    done = world.code, world.distance, world.time, world.measurements, world.decisions
+    return Result(*done, away, world.pose_error, world.yaw_error)
+
+
+def no_results(*shape: int) -> Result:
+    """Zeros, on the host."""
+    kinds = int, float, float, int, int, float, float, float
+    return Result(*(np.zeros(shape, kind) for kind in kinds))
 
 
 @jax.tree_util.register_dataclass
@@ -164,7 +179,7 @@ def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots:
     job = jnp.arange(slots, dtype=jnp.int32)
     world, mind = begin(arenas, settings, jobs, job, program)
     zero, none = jnp.zeros(jobs.arena.shape), jnp.zeros(jobs.arena.shape, jnp.int32)
-    result = Result(none + Code.RUNNING, zero, zero, none, none, zero)
+    result = Result(none + Code.RUNNING, zero, zero, none, none, zero, zero, zero)
     return Queue(world, mind, job, jnp.int32(slots), result)
 
 
@@ -186,8 +201,7 @@ def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program
         """Write down the missions that have ended, and give their slots the next jobs."""
         world = queue.world
         ended = (queue.job < jobs.count) & (world.code != Code.RUNNING)
-        away = jnp.hypot(arena.goal_xy[:, 0] - world.pose.x, arena.goal_xy[:, 1] - world.pose.y)
-        last = Result(world.code, world.distance, world.time, world.measurements, world.decisions, away)
+        last = ending(world, arena.goal_xy)
         row = jnp.where(ended, queue.job, jobs.arena.shape[0])
         result = jax.tree.map(lambda all, new: all.at[row].set(new, mode="drop"), queue.result, last)
         job = jnp.where(ended, queue.next_job + jnp.cumsum(ended) - 1, queue.job).astype(jnp.int32)
@@ -210,7 +224,8 @@ def begin(arenas: Arena, settings: Settings, jobs: Jobs, job: Int[Array, "S"], p
     """Fresh missions for the jobs of all slots."""
     at = jnp.minimum(job, jobs.arena.shape[0] - 1)
     arena, setting = pick(arenas, jobs.arena[at]), pick(settings, jobs.point[at])
-    return jax.vmap(start, in_axes=(0, 0, 0, None))(arena, setting, jobs.seed[at], program.spec)
+    begun = jax.vmap(start, in_axes=(0, 0, 0, None, None))
+    return begun(arena, setting, jobs.seed[at], program.spec, program.localisation)
 
 
 def pick(tree, index: Int[Array, "S"]):

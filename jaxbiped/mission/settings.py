@@ -23,6 +23,7 @@ from jaxbiped.motion.robot import Footing, RobotConfig
 from jaxbiped.planning import Costs
 from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
 from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
+from jaxbiped.sensing.motion import VisualConfig, VisualNoise
 from jaxbiped.sensing.noise import NoiseConfig, StereoNoise
 from jaxbiped.sensing.odometry import OdometryConfig, OdometryNoise
 from jaxbiped.sensing.presets import PRESETS, sensor_preset
@@ -33,6 +34,7 @@ SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinemati
 # stereo camera, as wide as the body, sweeps 12 cm to either side
 BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
 SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
+VISUAL = ("visual",)  # localisations that measure the motion between two views
 
 # Bounded so that sums of costs along a path keep their differences in single precision.
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
@@ -83,6 +85,10 @@ class MissionConfig(Model):
     executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
     """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
     MuJoCo's own batch or in MJX."""
+    localisation: Literal["landmarks", "odometry", "visual"] = "landmarks"
+    """How the robot knows where it stands: dead reckoning, corrected by landmarks, by nothing, or by the motion that
+    what both of two views show tells (not in the paper). Without landmarks there are none in the arena. The sensor
+    `oracle` knows the pose."""
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False
@@ -94,6 +100,7 @@ class MissionConfig(Model):
     stereo: NoiseConfig = NoiseConfig()
     landmarks: LandmarkConfig = LandmarkConfig()
     odometry: OdometryConfig = OdometryConfig()
+    visual: VisualConfig = VisualConfig()
     mapping: MapConfig = MapConfig()
     limits: LimitConfig = LimitConfig()
     walk: WalkConfig = WalkConfig()
@@ -146,6 +153,7 @@ class MissionConfig(Model):
             stereo=numbers(self.stereo),
             landmarks=numbers(self.landmarks),
             odometry=numbers(self.odometry),
+            visual=numbers(self.visual),
             mapping=numbers(self.mapping, "params"),
             library=library_numbers(self.library),
             footing=numbers(self.robot.footing),
@@ -200,6 +208,7 @@ class Settings:
     stereo: StereoNoise
     landmarks: LandmarkNoise
     odometry: OdometryNoise
+    visual: VisualNoise
     mapping: MapParams
     library: Library
     footing: Footing
@@ -215,9 +224,11 @@ class Program:
     sensor: str
     executor: str
     footing: bool = False  # feet are placed by measured edges; else by cells alone
+    localisation: str = "landmarks"
 
 
 def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
     """The static part of a config for arenas of one size [m]."""
     footing = config.executor != "kinematic"
-    return Program(config.grid(size_xy), config.camera.image, config.sensor, config.executor, footing)
+    localisation = "landmarks" if config.sensor == "oracle" else config.localisation
+    return Program(config.grid(size_xy), config.camera.image, config.sensor, config.executor, footing, localisation)

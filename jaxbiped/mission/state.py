@@ -13,7 +13,7 @@ from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import GridMap, GridSpec, empty
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import Settings
+from jaxbiped.mission.settings import VISUAL, Settings
 from jaxbiped.sensing.edges import Edge, unknown
 from jaxbiped.sensing.localisation import Belief
 
@@ -31,6 +31,9 @@ class World:
     decisions: Int[Array, "*B"]
     code: Int[Array, "*B"]  # Code
     seed: UInt32[Array, "*B"]  # of all noise of this mission
+    pose_error: Float[Array, "*B"]  # [m] from where the robot believes to stand
+    yaw_error: Float[Array, "*B"]  # [rad] the same of its yaw, without sign
+    before: Pose | None = None  # where it stood one command earlier; only where its motion is measured
 
 
 @jax.tree_util.register_dataclass
@@ -48,6 +51,19 @@ class Carriage:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
+class Anchor:
+    """What a robot that goes by what it sees, and not by landmarks, measures its motion from: its last view."""
+
+    belief: Belief  # after it
+    look: Bool[Array, "*B"]  # how the camera was held
+    squat: Bool[Array, "*B"]
+    moved: Float[Array, "*B 3"]  # dx, dy [m], dyaw [rad] since, by odometry
+    variances: Float[Array, "*B 3"]  # of that
+    some: Bool[Array, "*B"]  # False before the first view
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class Mind:
     """The robot's side. The stance is known to both."""
 
@@ -59,9 +75,12 @@ class Mind:
     fresh: Bool[Array, "*B"]  # nothing measured yet: whatever the map holds is of no mission of this robot
     ahead: Edge  # of the ground, that the robot is about to cross; only where footing counts
     behind: Edge  # that it crossed last
+    anchor: Anchor | None = None  # only where its motion is measured
 
 
-def start(arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridSpec) -> tuple[World, Mind]:
+def start(
+    arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridSpec, localisation: str = "landmarks"
+) -> tuple[World, Mind]:
     """One mission before its first measurement. The robot knows where it starts (paper, 2, condition 2)."""
     x, y, yaw = arena.start_xyyaw
     pose = Pose(x, y, ground_height(arena.boxes, x, y), yaw)
@@ -69,7 +88,10 @@ def start(arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridS
     no, zero = jnp.zeros((), bool), jnp.zeros((), jnp.int32)
     code = jnp.where(away <= settings.limits.goal_radius, Code.REACHED, Code.RUNNING).astype(jnp.int32)
     code = jnp.where(jnp.isfinite(away) & jnp.isfinite(yaw), code, Code.INVALID)
-    world = World(pose, no, jnp.zeros(()), jnp.zeros(()), zero, zero, code, seed)
+    visual = localisation in VISUAL
+    none = jnp.zeros(())
+    world = World(pose, no, none, none, zero, zero, code, seed, none, none, before=pose if visual else None)
     level = jnp.round(pose.z / spec.level_height)
     belief = Belief(Pose(x, y, level * spec.level_height, yaw), jnp.diag(settings.limits.start_variance))
-    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown())
+    anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None
+    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown(), anchor)

@@ -84,7 +84,9 @@ def run_bare(
 ) -> World:
     """The end of one mission (no batch axis); its world has a leading axis of 1."""
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (arena, settings))
-    world, mind = jax.tree.map(lambda leaf: leaf[None], start(arena, settings, seed, program.spec))
+    world, mind = jax.tree.map(
+        lambda leaf: leaf[None], start(arena, settings, seed, program.spec, program.localisation)
+    )
     while world.code[0] == Code.RUNNING:
         before = world
         seen = eyes.see(world, mind, *batch) if eyes else None

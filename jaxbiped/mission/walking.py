@@ -37,7 +37,7 @@ from jaxbiped.mission.judging import (
     think_on,
 )
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, OnProgress, Result, tally
+from jaxbiped.mission.queue import Jobs, OnProgress, Result, ending, no_results, tally
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.stage import Stage
 from jaxbiped.mission.state import Carriage, Mind, World, start
@@ -101,7 +101,8 @@ def walk_logged(
 ) -> Mission:
     """One mission of a simulated biped, with a log of everything; as `stepped.run_logged` gives it."""
     arenas, points, world = jax.tree.map(
-        lambda leaf: jnp.asarray(leaf)[None], (arena, settings, start(arena, settings, seed, program.spec)[0])
+        lambda leaf: jnp.asarray(leaf)[None],
+        (arena, settings, start(arena, settings, seed, program.spec, program.localisation)[0]),
     )
     zero = jnp.zeros(1, jnp.int32)
     recorder = Recorder(settings, program, on_decision, eyes)
@@ -151,7 +152,7 @@ class Walkers:
         self.tapes = [self.stage.rest(False)] * size
         self.place, self.length = np.zeros((2, size), int)  # on the tape; beyond its end the last row is held
         jobs_in_all = len(self.arena_of)
-        self.result = Result(*(np.zeros(jobs_in_all, kind) for kind in (int, float, float, int, int, float)))
+        self.result = no_results(jobs_in_all)
         self.result.code[:] = Code.RUNNING
         self.goals = np.asarray(arenas.goal_xy)
         self.world, self.mind = fresh(arenas, settings, jobs, jnp.asarray(self.job), program)
@@ -244,10 +245,8 @@ class Walkers:
     def write(self, s: int | np.integer, world: World) -> None:
         """Write down how the mission of a slot ended."""
         job = self.job[s]
-        goal = self.goals[self.arena_of[job]]
-        away = np.hypot(goal[0] - world.pose.x, goal[1] - world.pose.y)
-        values = world.code, world.distance, world.time, world.measurements, world.decisions, away
-        for column, value in zip(jax.tree.leaves(self.result), values, strict=True):
+        last = ending(world, self.goals[self.arena_of[job]])
+        for column, value in zip(jax.tree.leaves(self.result), jax.tree.leaves(last), strict=True):
             column[job] = value
 
     def renew(self, ended: Bool[np.ndarray, "S"]) -> None:

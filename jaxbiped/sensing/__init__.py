@@ -7,13 +7,14 @@ from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
 from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
 from jaxbiped.sensing.landmarks import sight as sight_landmarks
 from jaxbiped.sensing.localisation import Belief, correct, known, predict
+from jaxbiped.sensing.motion import VisualConfig, VisualNoise
 from jaxbiped.sensing.noise import NoiseConfig, StereoNoise
 from jaxbiped.sensing.odometry import OdometryConfig, OdometryNoise, drift
 from jaxbiped.sensing.oracle import measure as measure_oracle
 from jaxbiped.sensing.presets import PRESETS, SensorConfig, sensor_preset
 from jaxbiped.sensing.raycast import measure as measure_raycast
 from jaxbiped.sensing.sensor import Sensor
-from jaxbiped.sensing.view import Sightings, View
+from jaxbiped.sensing.view import Motion, Sightings, View
 
 __all__ = [
     "PRESETS",
@@ -23,6 +24,7 @@ __all__ = [
     "ImageSpec",
     "LandmarkConfig",
     "LandmarkNoise",
+    "Motion",
     "NoiseConfig",
     "OdometryConfig",
     "OdometryNoise",
@@ -31,6 +33,8 @@ __all__ = [
     "Sightings",
     "StereoNoise",
     "View",
+    "VisualConfig",
+    "VisualNoise",
     "correct",
     "drift",
     "known",

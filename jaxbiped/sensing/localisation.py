@@ -1,7 +1,8 @@
 """Where the robot believes it stands: an iterated extended Kalman filter over (x, y, yaw), shared by all sensors.
 
 Odometry predicts, landmarks of known place correct (paper, 2.1). Each landmark seen is one observation of two numbers,
-so that a single one, which fixes no pose by itself, still counts.
+so that a single one, which fixes no pose by itself, still counts. Without landmarks (not in the paper, which names it
+as future work) two pictures tell of the motion between them, and what a map holds of the pose itself.
 """
 
 from __future__ import annotations
@@ -10,16 +11,18 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxbiped.arenas.arena import Landmarks
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.geometry.small import matrix, product
-from jaxbiped.sensing.view import Sightings
+from jaxbiped.sensing.view import Motion, Sightings
 
 GATE = 18.4  # squared Mahalanobis distance with two degrees of freedom: one good sighting in 10,000 is refused
+GATE_POSE = 21.1  # the same with three
 ROUNDS = 3  # of linearising
-LEAST_VARIANCE = 1e-8  # [m^2] of a sighting: keeps the innovation invertible in float32
+LEAST_VARIANCE = 1e-8  # [m^2, rad^2] of what is measured: keeps the innovation invertible in float32
 
 
 @jax.tree_util.register_dataclass
@@ -47,13 +50,65 @@ def predict(
 
     `variances` [m^2, m^2, rad^2] are those of the displacement's own error, in that frame.
     """
-    pose = belief.pose
+    after, F, G = displaced(belief.pose, dx, dy, dyaw)
+    return Belief(after, product(product(F, belief.cov), F.T) + product(G * variances, G.T))
+
+
+def displaced(
+    pose: Pose, dx: Float[Array, ""], dy: Float[Array, ""], dyaw: Float[Array, ""]
+) -> tuple[Pose, Float[Array, "3 3"], Float[Array, "3 3"]]:
+    """A pose after a displacement in its own frame, and how errors of the pose and of the displacement carry over."""
     x, y = to_world(pose, dx, dy)
     cos, sin, zero, one = jnp.cos(pose.yaw), jnp.sin(pose.yaw), jnp.zeros_like(pose.yaw), jnp.ones_like(pose.yaw)
     F = matrix(((one, zero, pose.y - y), (zero, one, x - pose.x), (zero, zero, one)))
     G = matrix(((cos, -sin, zero), (sin, cos, zero), (zero, zero, one)))
-    cov = product(product(F, belief.cov), F.T) + product(G * variances, G.T)
-    return Belief(Pose(x, y, pose.z, wrap_angle(pose.yaw + dyaw)), cov)
+    return Pose(x, y, pose.z, wrap_angle(pose.yaw + dyaw)), F, G
+
+
+def predict_seen(
+    belief: Belief, moved: Float[Array, "3"], variances: Float[Array, "3"], motion: Motion
+) -> tuple[Belief, Bool[Array, ""]]:
+    """As `predict`, where two pictures have told of the same displacement too; and whether that was believed.
+
+    Two measurements of one displacement, of independent errors: the mean weighted by their covariances. A motion that
+    disagrees with odometry by more than `GATE_POSE`, was not seen, or is not finite, changes nothing.
+    """
+    told = jnp.stack([motion.x, motion.y, motion.yaw])
+    apart = wrap_last(told - moved)
+    Q = jnp.diag(variances)
+    R = motion.cov + LEAST_VARIANCE * jnp.eye(3)
+    gain, distance = weigh(Q, R, apart)
+    good = motion.seen & (distance <= GATE_POSE) & jnp.all(jnp.isfinite(gain)) & jnp.all(jnp.isfinite(told))
+    both = moved + jnp.sum(gain * apart, axis=1)
+    rest = jnp.eye(3) - gain
+    cov = product(product(rest, Q), rest.T) + product(product(gain, R), gain.T)
+    moved, cov = jnp.where(good, both, moved), jnp.where(good, cov, Q)
+    after, F, G = displaced(belief.pose, *moved)
+    return Belief(after, product(product(F, belief.cov), F.T) + product(product(G, cov), G.T)), good
+
+
+def weigh(
+    P: Float[Array, "3 3"], R: Float[Array, "3 3"], apart: Float[Array, "3"]
+) -> tuple[Float[Array, "3 3"], Float[Array, ""]]:
+    """The gain P (P + R)^-1 of a measurement of covariance R, and the squared Mahalanobis distance of `apart`."""
+    S_inverse = inverse(P + R)
+    return product(P, S_inverse), jnp.sum(apart * jnp.sum(S_inverse * apart, axis=1))
+
+
+def inverse(S: Float[Array, "3 3"]) -> Float[Array, "3 3"]:
+    """Of a symmetric positive matrix, whose rows may differ in unit: scaled to a diagonal of 1, then by cofactors."""
+    scale = 1 / jnp.sqrt(jnp.maximum(jnp.diagonal(S), 1e-30))
+    a, b, c, d, e, f = (S * scale[:, None] * scale)[np.triu_indices(3)]
+    rows = ((d * f - e * e, c * e - b * f, b * e - c * d), (c * e - b * f, a * f - c * c, b * c - a * e),
+            (b * e - c * d, b * c - a * e, a * d - b * b))  # fmt: skip
+    cofactors = matrix(rows)
+    determinant = a * cofactors[0, 0] + b * cofactors[0, 1] + c * cofactors[0, 2]
+    return cofactors / determinant * scale[:, None] * scale
+
+
+def wrap_last(difference: Float[Array, "3"]) -> Float[Array, "3"]:
+    """A difference of two (x, y, yaw), its angle brought to (-pi, pi]."""
+    return difference.at[2].set(wrap_angle(difference[2]))
 
 
 def correct(belief: Belief, landmarks: Landmarks, sightings: Sightings) -> Belief:

@@ -31,3 +31,16 @@ class Sightings:
     y: Float[Array, "*B L"]  # [m] left, robot frame
     sd: Float[Array, "*B L"]  # [m] standard deviation of x and of y
     seen: Bool[Array, "*B L"]
+    motion: Motion | None = None  # since the view before; only where the robot goes by it
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Motion:
+    """Where the robot of this view stands in the robot frame of the view before, as pictures alone tell it."""
+
+    x: Float[Array, "*B"]  # [m] forward
+    y: Float[Array, "*B"]  # [m] left
+    yaw: Float[Array, "*B"]  # [rad]
+    cov: Float[Array, "*B 3 3"]  # of (x, y, yaw)
+    seen: Bool[Array, "*B"]  # False: nothing was found, and the rest is zero

@@ -22,7 +22,18 @@ from jaxbiped.devices import by_rows, mesh_of
 from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
+from jaxbiped.mission.queue import (
+    SLOTS,
+    Jobs,
+    OnProgress,
+    Result,
+    Tally,
+    Work,
+    compile_queue,
+    ending,
+    no_results,
+    stack,
+)
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.hashing import from_key
@@ -89,7 +100,9 @@ def compute(
     batch, seeds = draw(jax.random.key(config.seed), index, config.families, group.populations)
     play = partial(run_all, workers=workers)
     with contextlib.ExitStack() as stack:
-        eyes = stack.enter_context(contextlib.closing(StereoEyes(group.camera))) if group.camera else None
+        eyes = StereoEyes(group.camera, group.static.localisation) if group.camera else None
+        if eyes:
+            stack.enter_context(contextlib.closing(eyes))
         if group.walk is not None:
             from jaxbiped.study.walks import walk_all  # loads MuJoCo
 
@@ -218,8 +231,7 @@ def run_one_by_one(
 ) -> Result:
     """As `run_all`, one mission after the other, for a sensor that measures on the host."""
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
-    shape = kinds, count
-    out = Result(*(np.zeros(shape, kind) for kind in (int, float, float, int, int, float)))
+    out = no_results(kinds, count)
     done = Tally(0, 0)
     for arena_number, point in np.ndindex(count, kinds):
         arena, settings = (
@@ -227,9 +239,8 @@ def run_one_by_one(
             for tree, row in ((batch, size * population_of[point] + arena_number), (points, point))
         )
         world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, eyes))
-        away = np.hypot(arena.goal_xy[0] - world.pose.x, arena.goal_xy[1] - world.pose.y)
-        values = world.code, world.distance, world.time, world.measurements, world.decisions, away
-        for column, value in zip(jax.tree.leaves(out), values, strict=True):
+        last = jax.device_get(ending(world, arena.goal_xy))
+        for column, value in zip(jax.tree.leaves(out), jax.tree.leaves(last), strict=True):
             column[point, arena_number] = value[0]
         done = done + Tally(1, int(world.code[0] == Code.REACHED))
         on_progress(done)
@@ -281,6 +292,8 @@ def frame(
         "measurements": result.measurements,
         "decisions": result.decisions,
         "goal_distance": result.goal_distance,
+        "pose_error": result.pose_error,
+        "yaw_error": result.yaw_error,
         "reachable": reachable,
         "oracle_cost": masked(cost, reachable),
         "oracle_length": masked(length, reachable & np.isfinite(length)),

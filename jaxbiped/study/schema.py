@@ -29,6 +29,8 @@ SCHEMA = pl.Schema(
         "measurements": pl.Int32,
         "decisions": pl.Int32,
         "goal_distance": pl.Float64,  # [m] from the goal at the end
+        "pose_error": pl.Float64,  # [m] from where the robot believed to stand at the end
+        "yaw_error": pl.Float64,  # [rad] the same of its yaw, 0 to pi
         "reachable": pl.Boolean,  # a plan exists for this strategy with perfect knowledge (the oracle plan)
         "oracle_cost": pl.Float64,  # that plan's cost; null where there is none
         "oracle_length": pl.Float64,  # [m] that plan's length; null where there is none
@@ -42,7 +44,7 @@ def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
 
     Checked: columns and types, the named values, nulls (a number that is not valid is null, never NaN), that
     distance and time are there exactly for those that reached, and that no row comes twice. NaN is allowed only in
-    `walked`, `elapsed` and `goal_distance` of a mission that ended as `invalid`.
+    `walked`, `elapsed`, `goal_distance` and the errors of a mission that ended as `invalid`.
     """
     where = {"file": str(file)} if file is not None else {}
     for name, dtype in SCHEMA.items():
@@ -77,7 +79,7 @@ def rules() -> dict[str, tuple[pl.Expr, str]]:
     for name in ("distance", "time"):
         wrong = (pl.col(name).is_not_null() != reached) | ~pl.col(name).is_finite() | (pl.col(name) < 0)
         checks[name] = (wrong, "must be finite and not negative where the code is reached, null elsewhere")
-    for name in ("walked", "elapsed", "goal_distance"):
+    for name in ("walked", "elapsed", "goal_distance", "pose_error", "yaw_error"):
         wrong = ~invalid & (~pl.col(name).is_finite() | (pl.col(name) < 0))
         checks[name] = (wrong, "must be finite and not negative unless the code is invalid")
     for name in ("oracle_cost", "oracle_length"):

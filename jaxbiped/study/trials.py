@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, Work, compile_queue, tally
+from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.settings import MissionConfig, Settings, program
 from jaxbiped.planning import Costs
 from jaxbiped.study.evaluate import WORKERS, draw
@@ -55,8 +55,7 @@ class Trials:
         settings = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (VECTORS, *jnp.shape(leaf))), base)
         key, length = jax.random.key(self.seed), VECTORS * BLOCK
         pieces = list(itertools.product(range(0, len(index), BLOCK), range(0, len(costs), VECTORS)))
-        kind = Result(*(np.int32, np.float32, np.float32, np.int32, np.int32, np.float32))
-        out = jax.tree.map(lambda dtype: np.zeros((len(costs), len(index)), dtype), kind)
+        out = jax.tree.map(lambda leaf: leaf.astype(f"{leaf.dtype.kind}4"), no_results(len(costs), len(index)))
         done, lock, stop = [Tally(0, 0)], threading.Lock(), threading.Event()
 
         def look(_: object) -> None:

@@ -31,7 +31,15 @@ def rows(arenas: int = 240, seed: int = 0, strategies: tuple[str, ...] = schema.
             reachable = bool(reached or rng.random() < 0.5)
             values = (0, arena, family, difficulty, strategy, str(code), bool(reached))
             values += (distance, time) if reached else (None, None)
-            values += (distance * share, time * share, int(30 * share), int(28 * share), 0.05 if reached else 0.6)
+            values += (
+                distance * share,
+                time * share,
+                int(30 * share),
+                int(28 * share),
+                0.05 if reached else 0.6,
+                0.01,
+                0.02,
+            )
             values += (reachable, *((60.0, distance) if reachable else (None, None)))
             for name, value in zip(columns, values, strict=True):
                 columns[name].append(value)

@@ -38,6 +38,7 @@ def set_first(column, value):
         ("time", -1.0),
         ("walked", float("nan")),
         ("goal_distance", -0.1),
+        ("pose_error", -0.1),
         ("reachable", None),
         ("oracle_cost", float("inf")),
         ("difficulty", float("nan")),

@@ -34,7 +34,7 @@ class Made:
         zero = np.zeros(time.shape)
         code = np.where(failed, Code.FELL, Code.REACHED)
         on_progress(tally(code.ravel()))
-        return Result(code, zero + 1, time, zero.astype(int), zero.astype(int), zero)
+        return Result(code, zero + 1, time, zero.astype(int), zero.astype(int), zero, zero, zero)
 
 
 def test_finds_the_best_costs_and_beats_the_start_and_the_sweep():
@@ -105,7 +105,7 @@ def test_objective_of_missions():
     code = np.array([Code.REACHED, Code.REACHED, Code.FELL, Code.INVALID])
     time = np.array([500.0, 5000.0, 20.0, np.nan])
     rest = np.zeros(4)
-    result = Result(code, rest, time, rest.astype(int), rest.astype(int), rest)
+    result = Result(code, rest, time, rest.astype(int), rest.astype(int), rest, rest, rest)
     assert objective(result, 1800.0).tolist() == [500.0, 1800.0, 1800.0, 1800.0]
 
 

@@ -1,0 +1,71 @@
+"""Where a robot believes to stand after a measurement: by landmarks, as in the paper, or without any.
+
+One robot; `decision.perceive` maps it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, UInt32
+
+from jaxbiped.arenas.arena import Arena, Landmarks
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.settings import VISUAL, Program, Settings
+from jaxbiped.mission.state import Anchor, Mind, World
+from jaxbiped.sensing.camera import mount
+from jaxbiped.sensing.localisation import Belief, correct, predict_seen
+from jaxbiped.sensing.motion import track
+from jaxbiped.sensing.view import Sightings, View
+
+
+def localise(mind: Mind, sightings: Sightings, landmarks: Landmarks, program: Program) -> Mind:
+    """The mind after what a view tells of the robot's pose."""
+    if program.localisation == "landmarks":
+        return replace(mind, belief=correct(mind.belief, landmarks, sightings))
+    if program.localisation in VISUAL:
+        mind = replace(mind, belief=by_motion(mind, sightings))
+        zero = jnp.zeros(3)
+        here = Anchor(mind.belief, mind.look, mind.squat, zero, zero, jnp.ones_like(mind.fresh))
+        mind = replace(mind, anchor=here)
+    return mind
+
+
+def by_motion(mind: Mind, sightings: Sightings) -> Belief:
+    """The belief where the motion since the last view was seen; that of dead reckoning where it was not."""
+    anchor, motion = mind.anchor, sightings.motion
+    belief, good = predict_seen(anchor.belief, anchor.moved, anchor.variances, motion)
+    good = good & anchor.some
+    pose = Pose(belief.pose.x, belief.pose.y, mind.belief.pose.z, belief.pose.yaw)  # heights are counted
+    return choose(good, Belief(pose, belief.cov), mind.belief)
+
+
+def choose(good: Bool[Array, ""], new: Belief, old: Belief) -> Belief:
+    """One belief or the other."""
+    return jax.tree.map(lambda a, b: jnp.where(good, a, b), new, old)
+
+
+def carried_on(mind: Mind, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> Mind:
+    """The mind after a command, by odometry."""
+    if mind.anchor is None:
+        return mind
+    return replace(mind, anchor=replace(mind.anchor, moved=moved, variances=variances))
+
+
+def unmarked(
+    view: View, world: World, mind: Mind, arena: Arena, settings: Settings, program: Program, seed: UInt32[Array, ""]
+) -> Sightings:
+    """What a robot without landmarks sees of its own motion, as the ray-cast sensor has it.
+
+    Deviation: of a simulated biped the motion is that of its feet, whatever its body does over them.
+    """
+    zero = jnp.zeros_like(arena.landmarks.x)
+    none = Sightings(zero, zero, zero, zero > 0)
+    if program.localisation not in VISUAL:
+        return none
+    at = mount(settings.camera, mind.anchor.look, mind.anchor.squat)
+    camera, reach = settings.camera, settings.stereo.max_range
+    motion = track(view, world.pose, world.before, at, camera, settings.visual, program.image, reach, seed)
+    return replace(none, motion=replace(motion, seen=motion.seen & mind.anchor.some))

@@ -1,0 +1,130 @@
+"""Visual odometry of the ray-cast sensor: what a camera tells of the robot's own motion from one view to the next.
+
+`sensing.stereo.tracking` measures it in pictures. Here is a model of that: it takes points that both views show, and
+has errors of the size that rendered pictures have.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, UInt32
+from pydantic import Field
+
+from jaxbiped.config import Model
+from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
+from jaxbiped.sensing import hashing
+from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
+from jaxbiped.sensing.view import Motion, View
+
+VISUAL = 6  # channel of a view's seed
+LEAST_SHARE = 1e-4  # of the image, in both views: keeps the model's division finite where nothing is
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class VisualNoise:
+    """All traced; see `VisualConfig` for what each is. Angles in radians."""
+
+    forward: Float[Array, "*B"]
+    left: Float[Array, "*B"]
+    yaw: Float[Array, "*B"]
+    least_share: Float[Array, "*B"]
+    failure: Float[Array, "*B"]
+
+
+class VisualConfig(Model):
+    """Visual odometry of the ray-cast sensor. The defaults are what `sweeps/visual_odometry.py` prints of the real one.
+
+    Standard deviations are those where a tenth of the image's pixels shows what both views measure; they fall with
+    the square root of that share.
+    """
+
+    forward: float = Field(0.0005, ge=0, le=1)
+    """[m] standard deviation along x of the robot before the motion."""
+    left: float = Field(0.0004, ge=0, le=1)
+    """[m] along y."""
+    yaw: float = Field(0.05, ge=0, le=180)
+    """[deg] of the angle turned."""
+    least_share: float = Field(0.02, ge=0, le=1)
+    """Share of the pixels of the image that both views must measure; with less, nothing is found."""
+    failure: float = Field(0.01, ge=0, le=1)
+    """Chance that nothing is found where there is enough."""
+
+    def traced(self) -> VisualNoise:
+        """The same as traced arrays, angles in radians."""
+        values = self.model_dump() | {"yaw": math.radians(self.yaw)}
+        return VisualNoise(
+            **{field.name: jnp.asarray(values[field.name], jnp.float32) for field in fields(VisualNoise)}
+        )
+
+
+SHARE = 0.1  # of the image: where the standard deviations of `VisualConfig` hold
+
+
+def nothing() -> Motion:
+    """No motion measured."""
+    zero = jnp.zeros(())
+    return Motion(zero, zero, zero, jnp.zeros((3, 3)), jnp.zeros((), bool))
+
+
+def track(
+    view: View,
+    pose: Pose,
+    before: Pose,
+    at: Mount,
+    camera: Camera,
+    noise: VisualNoise,
+    image: ImageSpec,
+    max_range: Float[Array, ""] | float,
+    seed: UInt32[Array, ""],
+) -> Motion:
+    """The motion from the true pose `before`, where the last view was taken, to the true `pose` of this one.
+
+    Modelled, not imaged. The channel VISUAL of this view's `seed` is used.
+
+    Args:
+      view: of this one; its points are textured, since they were matched.
+      at: how the camera was held at the last view.
+      max_range: [m] from the camera; points beyond are not measured.
+    """
+    share = overlap(view, pose, before, at, camera, image, max_range)
+    shrink = jnp.sqrt(SHARE / jnp.maximum(share, LEAST_SHARE))
+    sd = jnp.stack([noise.forward, noise.left, noise.yaw]) * shrink
+    error = sd * hashing.normal(seed, np.arange(3), VISUAL)
+    lucky = hashing.uniform(seed, 3, VISUAL) >= noise.failure
+    x, y = to_robot(before, pose.x, pose.y)
+    yaw = wrap_angle(pose.yaw - before.yaw)
+    seen = (share >= noise.least_share) & lucky & jnp.isfinite(x + y + yaw)
+    found = Motion(x + error[0], y + error[1], yaw + error[2], jnp.diag(sd * sd), seen)
+    return jax.tree.map(lambda new, none: jnp.where(seen, new, none), found, nothing())
+
+
+def overlap(
+    view: View,
+    pose: Pose,
+    before: Pose,
+    at: Mount,
+    camera: Camera,
+    image: ImageSpec,
+    max_range: Float[Array, ""] | float,
+) -> Float[Array, ""]:
+    """Share of the image's pixels whose points lie where the camera at `before` measures them too.
+
+    What hides a point from there is not looked for.
+    """
+    x, y = to_robot(before, *to_world(pose, view.x, view.y))
+    z = view.z + pose.z - before.z
+    ahead, up = x - at.forward, z - at.height
+    cos, sin = jnp.cos(at.pitch), jnp.sin(at.pitch)
+    depth, down = cos * ahead - sin * up, -sin * ahead - cos * up
+    u, v = -camera.focal * y / depth + image.centre[0], camera.focal * down / depth + image.centre[1]
+    disparity = camera.focal * camera.baseline / depth
+    there = (depth > 0) & (disparity <= camera.max_disparity) & (v >= 0) & (v <= image.height - 1)
+    there = there & (u >= disparity) & (u <= image.width - 1) & (view.weight > 0)
+    there = there & (ahead * ahead + y * y + up * up <= max_range * max_range)
+    return jnp.sum(jnp.where(there, view.weight, 0.0)) / (image.width * image.height)
