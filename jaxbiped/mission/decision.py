@@ -19,12 +19,11 @@ from jaxbiped.mission.footing import place_feet
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.localising import localise
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.route import route
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
-from jaxbiped.motion.approach import foresight
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
-from jaxbiped.planning.rims import rim_costs
 from jaxbiped.sensing.view import Sightings, View
 
 LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is known
@@ -38,7 +37,7 @@ class Thought:
 
     classes: Int[Array, "B H W"]
     levels: Int[Array, "B H W"]
-    cost: Float[Array, "B H W"]  # cost to go
+    cost: Float[Array, "B H W"]  # what is left to go, see `route`
     ij: Int[Array, "B 2"]
     goal_ij: Int[Array, "B 2"]
     pose: Pose  # [B] as believed
@@ -62,27 +61,18 @@ def decide(
     blind = settings.strategy.blind
     plan_classes = jnp.where(blind[:, None, None], jnp.int8(Cell.FLOOR), classes)
     plan_levels = jnp.where(blind[:, None, None], jnp.int8(0), levels)
-    costs, rules = settings.costs.at_pitch(spec.pitch), settings.strategy.rules()
+    rules = settings.strategy.rules()
     goal_ij = jax.vmap(goal_cell, in_axes=(0, 0, 0, 0, None))(
         arena.goal_xy, settings.limits.goal_radius, plan_classes, rules, spec
     )
     heading = jax.vmap(nearest_direction)(mind.belief.pose.yaw)
-    if program.footing:
-        moves = planning.edge_costs(plan_classes, plan_levels, costs, rules)
-        moves = moves + rim_costs(plan_classes, plan_levels, spec.pitch)
-        to_go = planning.cost_to_go(moves, goal_ij)
-        length = max(stride(spec), foresight(spec))
-        directions = planning.read_path(to_go, moves, ij, length, heading).directions
-    else:
-        to_go = planning.field(plan_classes, plan_levels, costs, rules, goal_ij)
-        directions = planning.next_step(
-            to_go.cost, plan_classes, plan_levels, costs, rules, ij, heading, length=stride(spec)
-        )
+    yaw = mind.belief.pose.yaw
+    to_go, directions = route(plan_classes, plan_levels, goal_ij, ij, heading, yaw, settings, program)
     mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, 0, 0, None))(
         mind, view, ij, goal_ij, directions, classes, levels, blind, settings, program
     )
     evidence = mind.grid_map.evidence
-    return mind, command, verdict, Thought(classes, levels, to_go.cost, ij, goal_ij, mind.belief.pose, view, evidence)
+    return mind, command, verdict, Thought(classes, levels, to_go, ij, goal_ij, mind.belief.pose, view, evidence)
 
 
 def perceive(

@@ -16,6 +16,7 @@ from jaxbiped.mapping import Cell, level_view
 from jaxbiped.mapping.cobstacles import occupied_levels
 from jaxbiped.mission.decision import Thought, nearest_direction
 from jaxbiped.mission.log import Mark, Outline, Walk
+from jaxbiped.mission.route import quickest
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import World
 
@@ -111,9 +112,12 @@ def way(thought: Thought, settings: Settings, program: Program):
     blind = settings.strategy.blind
     classes = jnp.where(blind, jnp.int8(Cell.FLOOR), thought.classes)
     levels = jnp.where(blind, jnp.int8(0), thought.levels)
+    length = 3 * sum(program.spec.shape)
+    if program.planner == "heading":
+        field = quickest(classes, levels, thought.goal_ij, settings, program)
+        return planning.heading_path(field, thought.ij, thought.pose.yaw, length).directions
     costs, rules = settings.costs.at_pitch(program.spec.pitch), settings.strategy.rules()
     heading = nearest_direction(thought.pose.yaw[0])[None]
-    length = 3 * sum(program.spec.shape)
     return planning.next_step(thought.cost, classes, levels, costs, rules, thought.ij, heading, length=length)
 
 

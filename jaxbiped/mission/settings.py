@@ -93,6 +93,12 @@ class MissionConfig(Model):
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False
     """May an oblique move pass one blocked cell?"""
+    planner: Literal["cell", "heading"] = "cell"
+    """`cell`: the least cost by Eq. 1 (the paper's). `heading`: the least time over cells and headings, turns counted;
+    of the costs, C4 alone still counts there."""
+    foot_placement: bool | None = None
+    """Are the feet placed by measured edges? Else edges are crossed from cell to cell, as in the paper. By default for
+    all executors but `kinematic`."""
     costs: CostConfig = CostConfig()
     durations: DurationConfig = DurationConfig()
     robot: RobotConfig = RobotConfig()
@@ -224,11 +230,20 @@ class Program:
     sensor: str
     executor: str
     footing: bool = False  # feet are placed by measured edges; else by cells alone
+    planner: str = "cell"  # "heading": over cells and headings, by time
     localisation: str = "landmarks"
 
 
 def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
     """The static part of a config for arenas of one size [m]."""
-    footing = config.executor != "kinematic"
+    footing = config.executor != "kinematic" if config.foot_placement is None else config.foot_placement
     localisation = "landmarks" if config.sensor == "oracle" else config.localisation
-    return Program(config.grid(size_xy), config.camera.image, config.sensor, config.executor, footing, localisation)
+    return Program(
+        config.grid(size_xy),
+        config.camera.image,
+        config.sensor,
+        config.executor,
+        footing,
+        config.planner,
+        localisation,
+    )
