@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import jax
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.arenas.movers import Movers
 from jaxbiped.geometry.boxes import Boxes
 
 CIRCLE, SQUARE = 0, 1  # kinds of landmark
@@ -36,5 +37,6 @@ class Arena:
     start_xyyaw: Float[Array, "*B 3"]  # [m, m, rad]
     goal_xy: Float[Array, "*B 2"]  # [m]
     floor_contrast: Float[Array, "*B"]  # texture contrast of the floor, 0 to 1
-    family: Int[Array, "*B"]  # index into `families.FAMILIES`; -1 for a scene written by hand
+    family: Int[Array, "*B"]  # index into `families.KNOWN`; -1 for a scene written by hand
     difficulty: Float[Array, "*B"]  # 0 (easy) to 1 (hard)
+    movers: Movers | None = None  # None: all boxes stand

@@ -1,4 +1,4 @@
-"""Random arenas: six families, each with a difficulty from 0 (easy) to 1 (hard).
+"""Random arenas: six families that stand still and one that moves, each with a difficulty from 0 (easy) to 1 (hard).
 
 Every family lays its boxes out between a start on the left and a goal on the right of the area of the
 paper's experiments (180 x 140 cm; paper, 3.1). Arena k is a pure function of (key, k): the same in
@@ -11,13 +11,16 @@ from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
+from jaxbiped.arenas.movers import Movers
 from jaxbiped.arenas.population import Population, given_or
 from jaxbiped.geometry.boxes import Boxes, footprint_extent, plan_distance
 
-FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")
+FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")  # that stand still
+MOVING = ("traffic",)
+KNOWN = FAMILIES + MOVING
 
 MAX_BOXES = 12  # slots; every family fits
 DRAWS = 12  # rows of `MAX_BOXES` random numbers an arena
@@ -25,6 +28,9 @@ SIZE_X, SIZE_Y = 1.80, 1.40  # [m]
 BUMP = 0.03  # [m] one step of the robot (paper, Table 2)
 LINTEL = 0.37  # [m] clearance of a gate (paper, Table 2)
 TALL = 0.50  # [m] higher than the camera
+WALKERS = 4
+TRAFFIC_X = 0.18  # [m] from the middle to both sides, where blocks move: clear of start and goal
+TRAFFIC_SPEED = 0.02  # [m/s] greatest; the robot itself goes 2 mm/s, measurements included
 CLEARANCE = 0.22  # [m] kept free of obstacles around the start and the goal
 
 # Discs and squares beside the way and behind the goal: from most poses that look towards the goal, two are in view.
@@ -60,6 +66,8 @@ def sample(
     layouts = [LAYOUTS[name](u[4:], difficulty, middle, **fixed.get(name, {})) for name in families]
     boxes = replace(jax.tree.map(lambda *leaves: jnp.stack(leaves)[turn], *layouts), contrast=0.5 + 0.5 * u[1])
     boxes = _keep_ends_free(_keep_inside(boxes), start[:2], goal)
+    traffic = [name in MOVING for name in families]
+    movers = _movers(u[4:], boxes, jnp.array(traffic)[turn], population) if any(traffic) else None
     return Arena(
         size_xy=jnp.array([SIZE_X, SIZE_Y]),
         boxes=boxes,
@@ -67,8 +75,9 @@ def sample(
         start_xyyaw=start,
         goal_xy=goal,
         floor_contrast=jnp.float32(1.0),
-        family=jnp.array([FAMILIES.index(name) for name in families])[turn],
+        family=jnp.array([KNOWN.index(name) for name in families])[turn],
         difficulty=difficulty,
+        movers=movers,
     )
 
 
@@ -156,6 +165,27 @@ def _clutter(u, difficulty, middle) -> Boxes:
     return _boxes(x, y, (u[5] - 0.5) * jnp.pi, half_x, half_y, 0.0, top, used)
 
 
+def _traffic(u, difficulty, middle) -> Boxes:
+    """1 to 4 blocks of 8 to 14 cm that go to and fro across the way, every other one lower than the camera."""
+    u = u[:4, :WALKERS]
+    half, high = 0.04 + 0.03 * u[2], jnp.where(jnp.arange(WALKERS) % 2 == 0, TALL, 0.25)
+    used = jnp.arange(WALKERS) < jnp.round(1 + (WALKERS - 1) * difficulty)
+    x = middle[0] + TRAFFIC_X * (2 * u[0] - 1)
+    return _boxes(x, 0.15 + 0.25 * u[1], (u[3] - 0.5) * jnp.pi, half, half, 0.0, high, used)
+
+
+def _movers(u, boxes: Boxes, traffic: Bool[Array, ""], population: Population | None) -> Movers:
+    """The ways of the boxes of `_traffic`, 0.75 to 1.1 m long; of those of any other family, none."""
+    u = u[4:8]
+    x = jnp.clip(boxes.x + 0.2 * (2 * u[0] - 1), SIZE_X / 2 - TRAFFIC_X, SIZE_X / 2 + TRAFFIC_X)
+    speed = TRAFFIC_SPEED * u[2]
+    if population is not None:
+        speed = given_or(population.obstacle_speed, speed)
+    on = traffic & boxes.used
+    dx, dy, speed = (jnp.where(on, values, 0.0) for values in (x - boxes.x, 1.25 - 0.25 * u[1] - boxes.y, speed))
+    return Movers(dx, dy, speed, phase=jnp.where(on, 2 * u[3], 0.0))
+
+
 LAYOUTS = {
     "obstacles": _obstacles,
     "bump": _bump,
@@ -163,6 +193,7 @@ LAYOUTS = {
     "gate": _gate,
     "mixed": _mixed,
     "clutter": _clutter,
+    "traffic": _traffic,
 }
 
 

@@ -13,6 +13,9 @@ from jaxtyping import Array, Float
 
 from jaxbiped.config import Model
 
+# The family that each field is about.
+FAMILY_OF = {"bump_width": "bump", "bump_length": "bump", "obstacle_speed": "traffic"}
+
 
 class PopulationConfig(Model):
     """Measures of the boxes of a family that are the same in all of its arenas. What is not given is drawn."""
@@ -21,6 +24,8 @@ class PopulationConfig(Model):
     """[m] of the bar of the family `bump` along the way: how far one walks on it. Drawn from 0.15 to 0.45."""
     bump_length: Annotated[float, pydantic.Field(gt=0.0, le=1.4)] | None = None
     """[m] of that bar across the way, which makes the detour round it. Drawn from 0.24 to 1.4, longer where harder."""
+    obstacle_speed: Annotated[float, pydantic.Field(ge=0.0, le=1.0)] | None = None
+    """[m/s] of the blocks of the family `traffic`. Drawn from 0 to 0.02."""
 
     def traced(self) -> Population:
         """The same as arrays; NaN: drawn."""
@@ -35,8 +40,9 @@ class Population:
 
     bump_width: Float[Array, "*B"]
     bump_length: Float[Array, "*B"]
+    obstacle_speed: Float[Array, "*B"]
 
 
-def given_or(fixed: Float[Array, ""], drawn: Float[Array, ""]) -> Float[Array, ""]:
+def given_or(fixed: Float[Array, ""], drawn: Float[Array, "*S"]) -> Float[Array, "*S"]:
     """What is fixed, or else what was drawn."""
     return jnp.where(jnp.isnan(fixed), drawn, fixed)

@@ -47,7 +47,7 @@ class ChartConfig(Model):
     def params(self) -> MapParams:
         """These thresholds for `mapping.update`, to which a point then weighs what it covers."""
         named = {"voxel_points": self.voxel, "voxel_share": self.voxel_share, "solid_points": self.solid}
-        named |= {"fused_points": self.cell, "head_margin": self.head_margin, "max_range": math.inf}
+        named |= {"fused_points": self.cell, "head_margin": self.head_margin, "max_range": math.inf, "fade": math.inf}
         unused = ("view_points", "refit_slope", "refit_offset", "refit_inlier", "refit_points")
         return MapParams(**{name: jnp.float32(value) for name, value in (named | dict.fromkeys(unused, 0.0)).items()})
 

@@ -10,6 +10,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.geometry.pose import Pose, to_world
 from jaxbiped.mapping.cobstacles import c_obstacles
+from jaxbiped.mapping.fading import Eye, forget
 from jaxbiped.mapping.grid import Body, Cell, GridSpec
 from jaxbiped.mapping.leveling import level_view
 from jaxbiped.mapping.params import MapParams
@@ -38,14 +39,21 @@ def empty(spec: GridSpec) -> GridMap:
 
 
 def update(
-    grid_map: GridMap, view: View, pose: Pose, body: Body, params: MapParams, spec: GridSpec, refit: bool = True
+    grid_map: GridMap,
+    view: View,
+    pose: Pose,
+    body: Body,
+    params: MapParams,
+    spec: GridSpec,
+    refit: bool = True,
+    eye: Eye | None = None,
 ) -> GridMap:
     """The map after one more view of one arena.
 
     `pose` is where the robot believes to stand, `pose.z` [m] the height of its supporting surface. With `refit`
     (static) the view is first brought level by the floor that it sees. Its points then accumulate in the 3D grid, the
     cells are classed from the evidence of all views so far (`c_obstacles`), and each point of this view votes for the
-    class, and for the ground level, of its cell.
+    class, and for the ground level, of its cell. With `eye`, what this view makes old fades first (`mapping.fading`).
 
     Interpretation of the paper: a cell's class in a view is read from the 3D grid accumulated so far (Fig. 5), not from
     that view's points alone. A near view cannot see the lintel that earlier views saw, and would out-vote them.
@@ -59,10 +67,12 @@ def update(
         view = jax.lax.optimization_barrier(view)
     points = voxelise(view, pose, params, spec)
     points = jnp.where(points >= params.voxel_points * spec.cell_share, points, 0.0)
-    evidence = grid_map.evidence + points
-    classes, levels = c_obstacles(evidence, body, params, spec)
     count = points.sum(-1)
     count = jnp.where(count >= params.view_points * spec.cell_share, count, 0.0)
+    if eye is not None:
+        grid_map = forget(grid_map, view, points, pose, eye, spec)
+    evidence = grid_map.evidence + points
+    classes, levels = c_obstacles(evidence, body, params, spec)
     return add_votes(replace(grid_map, evidence=evidence), count, classes, levels)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import jax
@@ -45,10 +46,12 @@ class MapConfig(Model):
     """[m] a point this near to a level of the fitted floor lies on it"""
     refit_points: float = Field(400.0, ge=0)
     """pixels that must lie on the fitted floor; fewer, and the view stays as it is"""
+    fade: float | None = Field(None, gt=0)
+    """[s] after which what a view tells otherwise counts 1/e, for obstacles that move; by default nothing fades"""
 
     def params(self) -> MapParams:
         """These thresholds as traced numbers."""
-        given = self.model_dump()
+        given = self.model_dump() | {"fade": math.inf if self.fade is None else self.fade}
         return MapParams(**{name: jnp.float32(value) for name, value in given.items() if value is not None})
 
 
@@ -68,4 +71,5 @@ class MapParams:
     refit_offset: Float[Array, ""]
     refit_inlier: Float[Array, ""]
     refit_points: Float[Array, ""]
+    fade: Float[Array, ""]
     below_points: Float[Array, ""] | None = None  # None: the rule is left out of the program

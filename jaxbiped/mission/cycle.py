@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.movers import at_time, only
 from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mission.decision import Thought, climbed, decide
+from jaxbiped.mission.encounter import met
 from jaxbiped.mission.executors import EXECUTORS, Execution
 from jaxbiped.mission.footing import walked
 from jaxbiped.mission.localising import carried_on, unmarked
@@ -46,13 +49,23 @@ def cycle(
       seen: what each robot has just measured; None: measure here, by a sensor that is JAX.
     """
     view, thinking, command, verdict, thought = think(world, mind, arena, settings, program, seen=seen)
-    executed = jax.vmap(EXECUTORS[program.executor])(arena, world, command, settings)
+    executed = carry_out(arena, world, command, settings, program)
     after, moved = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, thinking, command, verdict, executed, arena, settings, program
     )
     running = world.code == Code.RUNNING
     after = jax.tree.map(lambda new, old: jnp.where(running.reshape(-1, *[1] * (new.ndim - 1)), new, old), after, world)
     return after, moved, view, command, thought
+
+
+def carry_out(arena: Arena, world: World, command: Command, settings: Settings, program: Program) -> Execution:
+    """What comes of the command of each robot, among boxes that stand and boxes that move."""
+    play = jax.vmap(EXECUTORS[program.executor])
+    if arena.movers is None:
+        return play(arena, world, command, settings)
+    executed = play(jax.vmap(partial(only, moving=False))(arena), world, command, settings)
+    run_into = jax.vmap(met)(arena, world, command, executed, settings)
+    return replace(executed, collided=executed.collided | run_into, fell=executed.fell & ~run_into)
 
 
 def think(
@@ -72,7 +85,8 @@ def think(
       seen: what each robot has just measured; None: measure here.
     """
     if seen is None:
-        seen = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, arena, settings, program, carriage)
+        now = arena if arena.movers is None else jax.vmap(at_time)(arena, world.time)
+        seen = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, now, settings, program, carriage)
     # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
     view, sightings = jax.lax.optimization_barrier(seen)
     if program.sensor == "oracle":
@@ -125,7 +139,8 @@ def conclude(
     belief = predict(mind.belief, *executed.moved, executed.variances)
     belief = replace(belief, pose=climbed(belief.pose, command.rise, program.spec))
     pose = jax.tree.map(lambda new, old: jnp.where(stays, old, new), executed.pose, world.pose)
-    time = world.time + settings.durations.measure + jnp.where(stays, 0.0, executed.time)
+    since = settings.durations.measure + jnp.where(stays, 0.0, executed.time)
+    time = world.time + since
     decisions = world.decisions + 1
     away = jnp.hypot(arena.goal_xy[0] - pose.x, arena.goal_xy[1] - pose.y)
 
@@ -152,4 +167,4 @@ def conclude(
         before=None if world.before is None else world.pose,
     )
     mind = carried_on(walked(mind, command, executed.moved, executed.variances), executed.moved, executed.variances)
-    return world, replace(mind, belief=belief)
+    return world, replace(mind, belief=belief, since=since)

@@ -15,6 +15,7 @@ from jaxbiped import mapping, planning
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.mapping.fading import Eye
 from jaxbiped.mission.footing import place_feet
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.localising import localise
@@ -24,10 +25,10 @@ from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
+from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.view import Sightings, View
 
 LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is known
-TRIES = 4  # measurements in a row without a path that end the mission: once around
 
 
 @jax.tree_util.register_dataclass
@@ -114,7 +115,8 @@ def read_map(
     """One robot with one more view: its mind, the classed map, and its cell."""
     spec, pose = program.spec, mind.belief.pose
     tilted = program.sensor != "oracle"  # whose points have no attitude error to take out
-    grid_map = mapping.update(mind.grid_map, view, pose, settings.body, settings.mapping, spec, refit=tilted)
+    eye = eye_of(mind, settings, program) if program.fading else None
+    grid_map = mapping.update(mind.grid_map, view, pose, settings.body, settings.mapping, spec, tilted, eye)
     classes, levels = mapping.classify(grid_map, settings.mapping, spec)
     ij = cell_of(pose.x, pose.y, spec)
     # Where the robot stands it can stand, on the level that it stands on, whatever the map makes of it.
@@ -124,6 +126,12 @@ def read_map(
     classes = classes.at[ij[0], ij[1]].set(jnp.where(own == Cell.GATE, own, ground))
     levels = levels.at[ij[0], ij[1]].set(level)
     return replace(mind, grid_map=grid_map), classes, levels, ij
+
+
+def eye_of(mind: Mind, settings: Settings, program: Program) -> Eye:
+    """What a robot measures by, and how much it keeps of what its new view tells otherwise."""
+    at = mount(settings.camera, mind.look, mind.squat)
+    return Eye(settings.camera, at, program.image, keep=jnp.exp(-mind.since / settings.mapping.fade))
 
 
 def choose(
@@ -157,7 +165,7 @@ def choose(
     ahead, climb = classes[i, j], levels[i, j] - levels[ij[0], ij[1]]
     halted = blind & ~lost & (((ahead != Cell.FLOOR) & (ahead != Cell.UNMEASURED)) | (climb != 0))
 
-    verdict = jnp.where(tries >= TRIES, Code.NO_PATH, Code.RUNNING)
+    verdict = jnp.where(tries >= settings.limits.max_looks, Code.NO_PATH, Code.RUNNING)
     verdict = jnp.where(at_goal | halted, Code.STUCK, verdict)
     still = lost | (verdict != Code.RUNNING)
     zero = jnp.zeros(())

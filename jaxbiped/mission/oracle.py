@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import planning
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.movers import only
 from jaxbiped.mapping import Body, Cell, truth_grid
 from jaxbiped.mission.decision import nearest_direction
 from jaxbiped.mission.goal import goal_cell
@@ -35,9 +36,10 @@ class OraclePlan:
 def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePlan:
     """Plans on the true class grid of each arena [A], under each of the settings [P].
 
-    `blind_stop` has one way, the one that it plans on an empty floor; its goal is reachable when that way is floor.
+    Boxes that move are left out. `blind_stop` has one way, the one that it plans on an empty floor; its goal is
+    reachable when that way is floor.
     """
-    spec = program.spec
+    arenas, spec = jax.vmap(partial(only, moving=False))(arenas), program.spec
     start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(arenas.start_xyyaw[:, 0], arenas.start_xyyaw[:, 1], spec)
     heading = jax.vmap(nearest_direction)(arenas.start_xyyaw[:, 2])
     row = jnp.arange(start_ij.shape[0])

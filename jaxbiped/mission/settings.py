@@ -66,6 +66,8 @@ class LimitConfig(Model):
     """[m] reached when this near to the goal (paper, 3.1)."""
     max_decisions: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 150
     """Decisions after which a mission is out of steps."""
+    max_looks: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 4
+    """Measurements in a row that show no path, each a quarter turn on, after which the robot gives up: once around."""
     edge_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.02
     """[m] that an edge may lie off under the robot before it falls; simulated bipeds fell from 0.025 on."""
     height_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.010
@@ -166,6 +168,7 @@ class MissionConfig(Model):
             limits=Limits(
                 goal_radius=jnp.float32(limits.goal_radius),
                 max_decisions=jnp.int32(limits.max_decisions),
+                max_looks=jnp.int32(limits.max_looks),
                 edge_tolerance=jnp.float32(limits.edge_tolerance),
                 height_tolerance=jnp.float32(limits.height_tolerance),
                 body_radius=jnp.float32(self.robot.body_radius),
@@ -194,6 +197,7 @@ class Limits:
 
     goal_radius: Float[Array, "*B"]  # [m]
     max_decisions: Int[Array, "*B"]
+    max_looks: Int[Array, "*B"]
     edge_tolerance: Float[Array, "*B"]  # [m]
     height_tolerance: Float[Array, "*B"]  # [m]
     body_radius: Float[Array, "*B"]  # [m]
@@ -232,12 +236,12 @@ class Program:
     footing: bool = False  # feet are placed by measured edges; else by cells alone
     planner: str = "cell"  # "heading": over cells and headings, by time
     localisation: str = "landmarks"
+    fading: bool = False  # the map forgets what has moved
 
 
 def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
     """The static part of a config for arenas of one size [m]."""
     footing = config.executor != "kinematic" if config.foot_placement is None else config.foot_placement
-    localisation = "landmarks" if config.sensor == "oracle" else config.localisation
     return Program(
         config.grid(size_xy),
         config.camera.image,
@@ -245,5 +249,6 @@ def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
         config.executor,
         footing,
         config.planner,
-        localisation,
+        localisation="landmarks" if config.sensor == "oracle" else config.localisation,
+        fading=config.mapping.fade is not None,
     )

@@ -75,6 +75,7 @@ class Mind:
     fresh: Bool[Array, "*B"]  # nothing measured yet: whatever the map holds is of no mission of this robot
     ahead: Edge  # of the ground, that the robot is about to cross; only where footing counts
     behind: Edge  # that it crossed last
+    since: Float[Array, "*B"]  # [s] from the last measurement to the next
     anchor: Anchor | None = None  # only where its motion is measured
 
 
@@ -94,4 +95,4 @@ def start(
     level = jnp.round(pose.z / spec.level_height)
     belief = Belief(Pose(x, y, level * spec.level_height, yaw), jnp.diag(settings.limits.start_variance))
     anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None
-    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown(), anchor)
+    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown(), none, anchor)

@@ -14,7 +14,7 @@ from jaxbiped.report.figures import CODE_COLOURS, canvas, difficulty, forest_row
 from jaxbiped.report.svg import INK, LINE, inline, themed
 from jaxbiped.report.tables import Sheet
 from jaxbiped.report.words import OPEN
-from jaxbiped.study import ALL, CODES, FAMILIES, Comparison
+from jaxbiped.study import ALL, CODES, KNOWN, Comparison
 from jaxbiped.study.schema import SCENE
 
 WIDTH = 5.2  # [inch]
@@ -143,7 +143,7 @@ def attributed(frame: pl.DataFrame, names: Sequence[str]) -> dict[str, np.ndarra
 
 def attribution_sheet(frame: pl.DataFrame, first: str, second: str) -> Sheet:
     """The same for two strategies, family by family."""
-    parts = [(family, frame.filter(pl.col("family") == family)) for family in (*FAMILIES, SCENE)]
+    parts = [(family, frame.filter(pl.col("family") == family)) for family in (*KNOWN, SCENE)]
     counts = {family: attributed(rows, (first, second)) for family, rows in parts if len(rows)}
     seen = [label for label in ("reached", UNPLANNED, *CODES[1:]) if any(item[label].any() for item in counts.values())]
     groups = tuple(

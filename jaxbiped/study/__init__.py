@@ -25,7 +25,7 @@ from jaxbiped.study.paired import (
 )
 from jaxbiped.study.pilot import Plan, paired_t_sample_size, plan
 from jaxbiped.study.power import connor_sample_size, mcnemar_power, sample_size
-from jaxbiped.study.schema import CODES, FAMILIES, SCHEMA, STRATEGIES, validate
+from jaxbiped.study.schema import CODES, FAMILIES, KNOWN, SCHEMA, STRATEGIES, validate
 from jaxbiped.study.sequential import Goal, Watch, enough, look
 from jaxbiped.study.sides import Side, Stored, choose, compare_sides, open_stored
 from jaxbiped.study.store import Manifest, Store, create, read, read_manifest, read_points, scan
@@ -34,6 +34,7 @@ __all__ = [
     "ALL",
     "CODES",
     "FAMILIES",
+    "KNOWN",
     "QUESTION",
     "SCHEMA",
     "STRATEGIES",

@@ -12,7 +12,7 @@ import polars as pl
 from jaxbiped.errors import InputError
 from jaxbiped.study.intervals import NOTHING, Estimate, proportion
 from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
-from jaxbiped.study.schema import CODES, FAMILIES, SCENE, STRATEGIES, validate
+from jaxbiped.study.schema import CODES, KNOWN, SCENE, STRATEGIES, validate
 
 QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about
 
@@ -157,7 +157,7 @@ def compare_named(
 def strata(frame: pl.DataFrame) -> Iterator[tuple[Stratum, pl.DataFrame]]:
     """All rows, then those of each family, then those of each third of the arenas by difficulty."""
     yield ALL, frame
-    for family in (*FAMILIES, SCENE):
+    for family in (*KNOWN, SCENE):
         rows = frame.filter(pl.col("family") == family)
         if len(rows):
             yield Stratum("family", family), rows

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 import pydantic
 import tyro
 
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.population import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
-from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.study.schema import FAMILIES, STRATEGIES
+from jaxbiped.mission.settings import SIMULATED, MissionConfig
+from jaxbiped.study.schema import FAMILIES, KNOWN, MOVING, STRATEGIES
 
-Family = Literal[FAMILIES]
+Family = Literal[KNOWN]
 StrategyName = Literal[STRATEGIES]
 
 
@@ -36,6 +36,11 @@ class StudyConfig(Model):
         for name in ("families", "strategies"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
                 raise ValueError(f"{name} must be named once each")
-        if self.population != PopulationConfig() and "bump" not in self.families:
-            raise ValueError("population fixes bumps, and needs the family bump")
+        for name, family in FAMILY_OF.items():
+            if getattr(self.population, name) is not None and family not in self.families:
+                raise ValueError(f"population.{name} needs the family {family}")
+        if MOVING & set(self.families) and (self.mission.executor in SIMULATED or self.mission.sensor == "stereo"):
+            raise ValueError(
+                "the family traffic moves: its executor is kinematic or sampled, its sensor raycast or oracle"
+            )
         return self

@@ -39,7 +39,7 @@ from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards
-from jaxbiped.study.schema import FAMILIES, SCENE, SCHEMA
+from jaxbiped.study.schema import KNOWN, SCENE, SCHEMA
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 WORKERS = 2  # queues worked off at once, a core each
@@ -280,7 +280,7 @@ def frame(
     columns = {
         "point": np.repeat(group.points, len(strategies) * count),
         "arena": np.tile(index, kinds),
-        "family": np.tile(np.array([*FAMILIES, SCENE])[family], kinds),
+        "family": np.tile(np.array([*KNOWN, SCENE])[family], kinds),
         "difficulty": np.tile(difficulty, kinds),
         "strategy": np.tile(np.repeat(strategies, count), len(group.points)),
         "code": LABELS[result.code],

@@ -12,7 +12,7 @@ import pydantic
 import tyro
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.population import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig, program
@@ -22,6 +22,7 @@ from jaxbiped.study.groups import Point
 from jaxbiped.study.memory import most_points
 
 POPULATION = "population"
+OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # numbers that may be left out
 EXAMPLES = "costs.c3, pitch, stereo.sd, robot.radius or population.bump_width"
 
 
@@ -75,8 +76,9 @@ class SweepConfig(StudyConfig):
             if fields.count(name) > 1:
                 raise InputError("is swept twice; a field can be in one axis", field=f"axis {name}")
             check_field(name, mission | {POPULATION: population})
-            if name.startswith(f"{POPULATION}.bump") and "bump" not in self.families:
-                raise InputError("needs the family bump among the families", field=f"axis {name}")
+            family = FAMILY_OF.get(name.removeprefix(f"{POPULATION}."))
+            if family and family not in self.families:
+                raise InputError(f"needs the family {family} among the families", field=f"axis {name}")
         own = []
         if self.base:
             leaves = dict(flat(mission | {POPULATION: population}))
@@ -147,7 +149,7 @@ def check_field(name: str, config: Mapping[str, Any]) -> None:
         message = "is a table; sweep a number in it" if inside else "no such field; sweep a number of the config"
         raise InputError(f"{message}, such as {', '.join(near[:4]) or EXAMPLES}", field=field)
     number = isinstance(leaves[name], int | float) and not isinstance(leaves[name], bool)
-    if not (number or (leaves[name] is None and name.startswith(f"{POPULATION}."))):
+    if not (number or (leaves[name] is None and name.startswith(OPTIONAL))):
         raise InputError(f"is not a number; sweep one, such as {EXAMPLES}", field=field, value=leaves[name])
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.cycle import SENSE
-from jaxbiped.mission.decision import LOOK_AROUND, TRIES
+from jaxbiped.mission.decision import LOOK_AROUND
 from jaxbiped.mission.goal import MARGIN
 from jaxbiped.mission.outcome import Code
 from jaxbiped.motion.primitives import Primitive
@@ -142,7 +142,7 @@ def decide(mind, classes, levels, ij, goal_ij, settings, spec):
     if moves[0] < 0:
         mind.tries += 1
         still.turn = LOOK_AROUND
-        return still, Code.NO_PATH if mind.tries >= TRIES else Code.RUNNING
+        return still, Code.NO_PATH if mind.tries >= int(settings.limits.max_looks) else Code.RUNNING
     mind.tries = 0
     ahead = ij[0] + DIRECTIONS[moves[0]][0], ij[1] + DIRECTIONS[moves[0]][1]
     known_floor = classes[ahead] in (Cell.FLOOR, Cell.UNMEASURED) and levels[ahead] == levels[ij]
