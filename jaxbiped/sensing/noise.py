@@ -2,8 +2,8 @@
 
 The model that reproduces rendered pairs matched by a semi-global matcher, ray by ray: sub-pixel noise that grows
 with the slope of the surface and is correlated over neighbours, 1/16 px steps, surfaces that one camera cannot see,
-surfaces nearer than the search range, holes at edges, at grazing incidence and on plain texture, foreground
-fattening at edges, and clumped phantoms where nothing can be matched.
+surfaces nearer than the search range, holes at edges, at grazing incidence, where one image shows a surface wider than
+the other, and on plain texture, foreground fattening at edges, and clumped phantoms where nothing can be matched.
 
 On a plane disparity is an affine function of the pixel. So first differences give the slope of a surface, and second
 differences vanish except at edges: no normals or object numbers are needed.
@@ -11,13 +11,13 @@ differences vanish except at edges: no normals or object numbers are needed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt32
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from jaxbiped.config import Model
 from jaxbiped.sensing import hashing
@@ -26,6 +26,7 @@ from jaxbiped.sensing.camera import Camera, ImageSpec
 MATCH, PHANTOM, ATTITUDE = 1, 2, 3  # channels of a view's seed
 HIDING_REACH = 128  # [px] how far to the right of a pixel something may hide it
 PHANTOM_BLOCK = 12  # [px] size of a clump of phantoms
+LEAST_WIDTH = 1e-2  # [px] in the right image, of one in the left: what turns away further is seen by none
 
 
 @jax.tree_util.register_dataclass
@@ -50,6 +51,8 @@ class StereoNoise:
     min_contrast: Float[Array, "*B"]
     max_range: Float[Array, "*B"]
     attitude_sd: Float[Array, "*B"]
+    stretch_kept: Float[Array, "*B"] | None = None  # None, as the next: left out of the program
+    stretch_lost: Float[Array, "*B"] | None = None
 
 
 class NoiseConfig(Model):
@@ -70,7 +73,7 @@ class NoiseConfig(Model):
     drop_edge: float = Field(0.20, ge=0, le=1)
     """Chance that a ray is lost at an edge."""
     drop_grazing: float = Field(0.45, ge=0, le=1)
-    """Chance that a ray is lost where the surface slopes by more than grazing_slope, or grazing_rise."""
+    """Chance that a ray is lost where slope exceeds grazing_slope or grazing_rise, or stretch reaches stretch_lost."""
     edge_jump: float = Field(2.5, gt=0, le=1000)
     """[px] second difference of disparity from which a ray counts as one at an edge."""
     grazing_slope: float = Field(0.8, gt=0, le=100)
@@ -89,13 +92,22 @@ class NoiseConfig(Model):
     """[m] from the camera; points beyond are dropped."""
     attitude_sd: float = Field(0.3, ge=0, le=20)
     """[deg] standard deviation of the robot's roll and pitch in a view, which the reprojection does not know."""
+    stretch_kept: float | None = Field(None, ge=0, le=100)
+    """Share by which one image may show a surface wider than the other before rays are lost; by default any."""
+    stretch_lost: float | None = Field(None, gt=0, le=100)
+    """The same share from which on drop_grazing of the rays are lost; between the two, in proportion."""
+
+    @model_validator(mode="after")
+    def check_stretch(self) -> NoiseConfig:
+        kept, lost = self.stretch_kept, self.stretch_lost
+        if (kept is None) != (lost is None) or (kept is not None and not kept < lost):
+            raise ValueError(f"stretch_lost must be above stretch_kept, or both left out, got {lost} and {kept}")
+        return self
 
     def traced(self) -> StereoNoise:
         """The same as traced arrays, angles in radians."""
-        values = self.model_dump() | {"attitude_sd": np.deg2rad(self.attitude_sd)}
-        return StereoNoise(
-            **{field.name: jnp.asarray(values[field.name], jnp.float32) for field in fields(StereoNoise)}
-        )
+        values = self.model_dump(exclude_none=True) | {"attitude_sd": np.deg2rad(self.attitude_sd)}
+        return StereoNoise(**{name: jnp.asarray(value, jnp.float32) for name, value in values.items()})
 
 
 RENDERED = NoiseConfig()
@@ -155,7 +167,11 @@ def match(
     counters = np.arange(4 * image.rows * image.columns, dtype=np.uint32).reshape(4, *shape)
     match_seed = hashing.fold(seed, MATCH)
     chance = hashing.bits(match_seed, counters[0])
-    dropped = half(chance) < jnp.where(grazing, noise.drop_grazing, jnp.where(edge, noise.drop_edge, noise.drop_plain))
+    lost = jnp.where(grazing, noise.drop_grazing, jnp.where(edge, noise.drop_edge, noise.drop_plain))
+    if noise.stretch_kept is not None:
+        over = (stretch(across, to_right) - noise.stretch_kept) / (noise.stretch_lost - noise.stretch_kept)
+        lost = jnp.maximum(lost, noise.drop_grazing * jnp.minimum(over, 1.0))
+    dropped = half(chance) < lost
     swapped = edge & (half(chance >> np.uint32(16)) < noise.edge_swap)
     beyond_across = jnp.where(jnp.abs(to_left) > jnp.abs(to_right), to_left, to_right)
     beyond_along = jnp.where(jnp.abs(to_up) > jnp.abs(to_down), to_up, to_down)
@@ -178,6 +194,15 @@ def match(
 def slope(before: Float[Array, "*s"], after: Float[Array, "*s"]) -> Float[Array, "*s"]:
     """Size of the slope that the differences to the ray before and the ray after agree on; 0 on a peak."""
     return jnp.where(before * after < 0, jnp.minimum(jnp.abs(before), jnp.abs(after)), 0.0)
+
+
+def stretch(across: Float[Array, "*s"], to_right: Float[Array, "*s"]) -> Float[Array, "*s"]:
+    """Share by which one image shows a surface wider than the other: 1 where twice as wide.
+
+    What is one pixel wide in the left image is 1 - slope wide in the right one, where disparity rises to the right by
+    `across` a pixel, and 1 + slope where it falls. Windows of one size then no longer show the same.
+    """
+    return across / jnp.where(to_right > 0, jnp.maximum(1 - across, LEAST_WIDTH), 1.0)
 
 
 def hidden_from_right(

@@ -142,7 +142,8 @@ def sensor_toml(fit: Fit, heading: Sequence[str]) -> str:
     for name in ("stereo", "landmarks"):
         part = getattr(fit.sensor, name)
         lines += ["", f"[{name}]"]
-        values = {field: f"{field} = {float(value)!r}" for field, value in part.model_dump().items()}
+        known = part.model_dump(exclude_none=True)
+        values = {field: f"{field} = {float(value)!r}" for field, value in known.items()}
         width = max(map(len, values.values())) + 2
         lines += [f"{text:<{width}}# {type(part).model_fields[field].description}" for field, text in values.items()]
     return "\n".join(lines) + "\n"

@@ -131,6 +131,12 @@ def match(disparity, contrast, camera, image, noise, seed):
     lost = np.full(shape, noise.drop_plain)
     lost[edge] = noise.drop_edge
     lost[grazing] = noise.drop_grazing
+    if noise.stretch_kept is not None:
+        width = np.where(to_right > to_left, 1 - across, 1 + across)  # in the right image, of a pixel of the left one
+        stretch = np.maximum(width, 1 / np.maximum(width, f32(1e-2))) - 1
+        stretch[width < 1e-2] = 100
+        share = np.clip((stretch - noise.stretch_kept) / (noise.stretch_lost - noise.stretch_kept), 0, 1)
+        lost = np.maximum(lost, noise.drop_grazing * share)
     dropped, swapped = first < lost, edge & (second < noise.edge_swap)
     other = np.where(
         bend_across > bend_along,

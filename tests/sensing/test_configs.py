@@ -18,7 +18,7 @@ def test_sensor_files_equal_the_constants(name):
     assert config.load(SensorConfig, path) == PRESETS[name] == sensor_preset(str(path))
     written = config.load_toml(path)
     for part in ("stereo", "landmarks"):  # every value is said, none left to defaults
-        assert set(written[part]) == set(type(getattr(PRESETS[name], part)).model_fields)
+        assert set(written[part]) == set(getattr(PRESETS[name], part).model_dump(exclude_none=True))
 
 
 def test_sensor_folder_holds_the_presets_and_nothing_else():
@@ -31,7 +31,7 @@ def test_fitted_sensor_says_everything():
     fitted, written = config.load(SensorConfig, path), config.load_toml(path)
     assert path.read_text().startswith("# Written by `jaxbiped fit-sensor")
     for part in ("stereo", "landmarks"):
-        assert set(written[part]) == set(type(getattr(fitted, part)).model_fields)
+        assert set(written[part]) == set(getattr(fitted, part).model_dump(exclude_none=True))
     assert abs(fitted.stereo.bias) < 0.1 and 0.1 < fitted.stereo.sd < 0.2
 
 
@@ -63,6 +63,9 @@ def test_the_paper_camera():
         (NoiseConfig, {"drop_edge": 1.1}, "drop_edge"),
         (NoiseConfig, {"correlation": 0.6}, "correlation"),
         (NoiseConfig, {"max_range": "far"}, "max_range"),
+        (NoiseConfig, {"stretch_kept": 0.5}, "stretch_lost must be above stretch_kept"),
+        (NoiseConfig, {"stretch_kept": 0.5, "stretch_lost": 0.5}, "or both left out"),
+        (NoiseConfig, {"stretch_kept": -1, "stretch_lost": 1}, "stretch_kept"),
         (SensorConfig, {"landmarks": {"nearest": -1}}, "landmarks.nearest"),
     ],
 )

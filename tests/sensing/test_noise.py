@@ -90,6 +90,17 @@ def test_drops_are_as_often_as_stated():
         assert abs(lost(plane(60, slope=slope), inner, grazing_rise=0.2, **chances) - share) < 0.015
 
 
+def test_what_one_image_shows_wider_is_lost_by_that():
+    """Width 1 in the left image is 1 - slope in the right one: a rise of 0.5 and a fall of 1 both stretch by 1."""
+    steep = {"grazing_slope": 100, "grazing_rise": 100, "drop_plain": 0.05, "drop_grazing": 0.8}
+    chances = steep | {"stretch_kept": 0.5, "stretch_lost": 1.5}
+    middle = np.flatnonzero(np.abs(IMAGE.u - IMAGE.centre[0]) < 60)  # where the plane is not cut
+    for slope, share in ((0.5, 0.4), (-1.0, 0.4), (0.3, 0.05), (-0.4, 0.05), (0.75, 0.8)):
+        found = lost(np.clip(plane(80, slope=slope), 1, 158), middle, **chances)
+        assert abs(found - share) < 0.02, (slope, found)
+    assert abs(lost(plane(80, along=0.4), slice(50, 64), **chances) - 0.05) < 0.015  # the same width in both
+
+
 def test_a_thin_post_is_an_edge_and_not_grazing():
     d = plane()
     d[:, 40] = 60  # one ray wide

@@ -13,6 +13,7 @@ from jaxbiped.sensing.raycast import cast, margin
 from tests.reference import sensing as reference
 from tests.sensing.scenes import CAMERA, IMAGE, as_jax, as_numpy, make, pose, random_scene, stack
 
+STRETCHED = PRESETS["rendered"].stereo.model_copy(update={"stretch_kept": 0.1, "stretch_lost": 0.6})
 SCENES = [random_scene(seed) for seed in range(16)]
 
 
@@ -100,10 +101,10 @@ def test_cast_agrees_with_mujoco():
         assert (~close).sum() <= 3, f"scene {k}"
 
 
-@pytest.mark.parametrize("preset", PRESETS)
+@pytest.mark.parametrize("preset", [*PRESETS, "stretched"])
 def test_whole_chain_agrees_with_plain_numpy(preset):
     """At least 99.9 % of rays within 1e-4 m: the rest round to the other step of 1/16 px, or lie on an edge."""
-    noise = PRESETS[preset].stereo.traced()
+    noise = (STRETCHED if preset == "stretched" else PRESETS[preset].stereo).traced()
     views = as_numpy(measure(SCENES, noise))
     same = []
     for k, (arena, where) in enumerate(SCENES):

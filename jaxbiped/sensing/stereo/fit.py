@@ -14,14 +14,17 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from jaxbiped.sensing.noise import NoiseConfig
+from jaxbiped.sensing.noise import LEAST_WIDTH, NoiseConfig
 from jaxbiped.sensing.stereo.measure import StereoSensor
 
 LAG = 8  # [px] over which slopes and edges are told: from a ray to the next
 THIN = 3  # every so many pixels across and down are kept
 CORE = 1.0  # [px] beyond which a disparity is wrong, not noisy
 SAME_DEPTH = 0.01  # relative: what both cameras see in one place is the same surface
-SLOPES = np.round(np.arange(0.2, 1.5, 0.02), 2)  # [px/px] that may be called grazing
+KEPT, OVER = np.arange(0.1, 1.55, 0.05), np.arange(0.05, 2.05, 0.05)  # stretches looked at: from, and how much more
+SHARES = np.arange(0.7, 0.99, 0.02)  # that may be lost of what is stretched most
+BIN, STRETCHED = 0.02, 4.0  # of a histogram of stretches, and its end
+OFF = 100.0  # [px/px] slope from which on nothing is lost that stretch does not lose
 FLAT = 0.02  # [px/px] slope of what faces the camera
 RIM, CREASE = 14, 0.02  # [px] that a rim's own texture reaches; second difference of disparity at one
 FEWEST = 200  # pixels of a kind that tell something of it
@@ -34,8 +37,7 @@ class Watched:
     true: Float32[np.ndarray, "N"]  # [px] disparity; 0 where there is nothing to see
     found: Float32[np.ndarray, "N"]  # [px]; 0 where not measured
     slope: Float32[np.ndarray, "N"]  # [px/px] across the image
-    rise: Float32[np.ndarray, "N"]  # [px/px] the same where disparity rises to the right, else 0
-    steepest: Float32[np.ndarray, "N"]  # [px/px] across or down
+    stretch: Float32[np.ndarray, "N"]  # share by which one image shows the surface wider than the other
     bend: Float32[np.ndarray, "N"]  # [px] second difference
     beyond: Float32[np.ndarray, "N"]  # [px] from here to the other side of an edge
     common: Bool[np.ndarray, "N"]  # both cameras see it
@@ -77,7 +79,7 @@ def thinned(
     d = true[n:-n, n:-n]
     to_left, to_right = true[n:-n, : -2 * n] - d, true[n:-n, 2 * n :] - d
     to_up, to_down = true[: -2 * n, n:-n] - d, true[2 * n :, n:-n] - d
-    across, along = slope(to_left, to_right) / n, slope(to_up, to_down) / n
+    across = slope(to_left, to_right) / n
     bend_across, bend_along = np.abs(to_left + to_right), np.abs(to_up + to_down)
     further_across = np.where(np.abs(to_left) > np.abs(to_right), to_left, to_right)
     further_along = np.where(np.abs(to_up) > np.abs(to_down), to_up, to_down)
@@ -86,8 +88,7 @@ def thinned(
         d,
         found[n:-n, n:-n],
         across,
-        np.where(to_right > 0, across, 0),
-        np.maximum(across, along),
+        across / np.where(to_right > 0, np.maximum(1 - across, LEAST_WIDTH), 1),
         np.maximum(bend_across, bend_along),
         np.where(bend_across > bend_along, further_across, further_along),
         common[n:-n, n:-n],
@@ -156,17 +157,18 @@ def share(
 def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
     """The noise that makes the ray-cast sensor measure as the matcher did; `base` has what no picture tells.
 
-    From `base` come the quantum, the thresholds of edges and of other slopes, the attitude's error, the range, and the
-    least contrast.
+    From `base` come the quantum, the threshold of edges, the attitude's error, the range, and the least contrast. What
+    is lost by its slope is told by stretch alone: a slope down the image loses nothing.
     """
     visible, measured = w.common & ~w.near, w.found > 0
     edge = w.bend > base.edge_jump
-    rise = grazing_rise(w.rise[visible & ~edge], measured[visible & ~edge], base.grazing_rise)
-    grazing = (w.steepest > base.grazing_slope) | (w.rise > rise)
-    plain = visible & ~edge & ~grazing
+    stretched = losses(w.stretch[visible & ~edge], ~measured[visible & ~edge])
+    even = w.stretch < stretched.get("stretch_kept", np.inf)
+    plain = visible & ~edge & even
     error = w.found - w.true
-    noisy = plain & measured & (np.abs(error) < CORE)
-    sd, gain = spread(error[noisy], w.slope[noisy])
+    smooth = visible & ~edge & measured & (np.abs(error) < CORE)
+    noisy = smooth & even
+    sd, gain = spread(error[smooth], w.slope[smooth])
     swapped = np.abs(error) > np.abs(error - w.beyond)
     hidden = ~w.common & ~w.near & (w.true > 0)
     wild = measured & (np.abs(error) > CORE)
@@ -175,36 +177,36 @@ def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
         "sd": sd,
         "slope_gain": gain,
         "correlation": float(np.clip(correlation(w, noisy, error), 0.0, 0.5)),
-        "grazing_rise": rise,
         "drop_plain": share(~measured, plain),
-        "drop_edge": share(~measured, visible & edge & ~grazing),
-        "drop_grazing": share(~measured, visible & grazing, otherwise=base.drop_grazing),
+        "drop_edge": share(~measured, visible & edge & even),
         "edge_swap": share(swapped, visible & edge & measured),
         "phantom_hidden": share(wild, hidden),
         "phantom_near": share(wild, w.near, otherwise=base.phantom_near),
     }
+    found |= stretched
     return base.model_copy(update={name: round(value, 4) for name, value in found.items()})
 
 
-def grazing_rise(rise: Float[np.ndarray, "N"], measured: Bool[np.ndarray, "N"], otherwise: float) -> float:
-    """Rise [px/px] to the right from which on surfaces are lost: of all thresholds the likeliest.
+def losses(stretch: Float[np.ndarray, "N"], lost: Bool[np.ndarray, "N"]) -> dict[str, float]:
+    """Between which stretches surfaces come to be lost, and how much of them at most: the likeliest; {} if none tells.
 
-    The model has one share that is lost below it, and another above.
+    The model has a constant share that is lost, and another that grows in proportion between two stretches.
     """
-    order = np.argsort(rise)
-    rise, lost = rise[order], np.cumsum(~measured[order])
-    candidates = np.searchsorted(rise, SLOPES)
-
-    def likelihood(lost: np.ndarray, of: np.ndarray) -> np.ndarray:
-        rate = np.clip(lost / np.maximum(of, 1), 1e-6, 1 - 1e-6)
-        return lost * np.log(rate) + (of - lost) * np.log1p(-rate)
-
-    enough = (candidates >= FEWEST) & (len(rise) - candidates >= FEWEST)
-    if not enough.any():
-        return otherwise
-    below = np.where(candidates > 0, lost[np.maximum(candidates, 1) - 1], 0)
-    total = likelihood(below, candidates) + likelihood(lost[-1] - below, len(rise) - candidates)
-    return float(SLOPES[np.argmax(np.where(enough, total, -np.inf))])
+    if (stretch > KEPT[0]).sum() < FEWEST:
+        return {}
+    bins = np.arange(0, STRETCHED + BIN, BIN)
+    number, _ = np.histogram(np.minimum(stretch, STRETCHED), bins)
+    gone, _ = np.histogram(np.minimum(stretch[lost], STRETCHED), bins)
+    least = max(gone.sum(where=bins[1:] <= KEPT[0]) / max(number.sum(where=bins[1:] <= KEPT[0]), 1), 1e-4)
+    best, likeliest = {}, -np.inf
+    for kept, over in itertools.product(KEPT, OVER):
+        ramp = np.clip((bins[:-1] + BIN / 2 - kept) / over, 0, 1)
+        chance = np.maximum(SHARES[:, None] * ramp, least)
+        likelihood = np.sum(gone * np.log(chance) + (number - gone) * np.log1p(-chance), axis=1)
+        if likelihood.max() > likeliest:
+            share, likeliest = float(SHARES[likelihood.argmax()]), likelihood.max()
+            best = {"stretch_kept": float(kept), "stretch_lost": float(kept + over), "drop_grazing": share}
+    return best | {"grazing_slope": OFF, "grazing_rise": OFF}
 
 
 def spread(error: Float[np.ndarray, "N"], across: Float[np.ndarray, "N"]) -> tuple[float, float]:

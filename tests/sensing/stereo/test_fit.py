@@ -64,12 +64,15 @@ def test_growth_with_the_slope_is_found_again():
     assert sd == pytest.approx(0.14 * 1.02, rel=0.05) and gain == pytest.approx(2.0, abs=0.2)
 
 
-def test_rise_of_what_is_grazing_is_found_again():
+def test_what_is_lost_by_stretch_is_found_again():
     rng = np.random.default_rng(0)
-    across = rng.uniform(0, 1, 50_000).astype(np.float32)
-    measured = rng.random(len(across)) > np.where(across > 0.5, 0.7, 0.02)
-    assert fit.grazing_rise(across, measured, 0.8) == pytest.approx(0.5, abs=0.02)
-    assert fit.grazing_rise(0 * across, measured, 0.8) == 0.8  # nothing tells
+    stretch = rng.uniform(0, 3, 50_000).astype(np.float32)
+    lost = rng.random(len(stretch)) < np.maximum(0.9 * np.clip((stretch - 0.5) / 0.7, 0, 1), 0.02)
+    found = fit.losses(stretch, lost)
+    assert found["stretch_kept"] == pytest.approx(0.5, abs=0.06)
+    assert found["stretch_lost"] == pytest.approx(1.2, abs=0.06)
+    assert found["drop_grazing"] == pytest.approx(0.9, abs=0.021)
+    assert fit.losses(0 * stretch, lost) == {}  # nothing tells
 
 
 def test_what_both_cameras_see():
