@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -10,6 +11,7 @@ from jaxbiped import planning
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import Times
+from jaxbiped.planning.heading.crossing import crossing_faces, dense_faces
 from tests.planning import heading_oracle, oracle
 
 H, W, B = 9, 11, 12
@@ -226,3 +228,16 @@ def test_errors():
         planning.heading_field(*floor())
     with pytest.raises(InputError, match="wavefront"):
         planning.heading_field(*floor(), goal_ij=fill((0, 0)), method="line_sweep")
+
+
+@pytest.mark.parametrize("pitch", [0.1, 0.05, 0.025])
+def test_faces_are_the_same_on_any_device(maps, pitch):
+    classes, levels = jnp.asarray(maps[0]), jnp.asarray(maps[1])
+    known = (classes != Cell.UNMEASURED) & (classes != Cell.OBSTACLE)
+    ours, dense = crossing_faces(classes, levels, pitch), dense_faces(known, levels, pitch)
+    own = np.arange(8)[:, None, None]
+    assert (ours != own).sum() > 20
+    # the compiled one leaves moves that are over no edge as they are
+    np.testing.assert_array_equal(np.where(ours == own, own, dense), ours)
+    over = np.asarray(planning.heading_field(*maps, pitch).moves.face) != own
+    np.testing.assert_array_equal(np.asarray(dense)[over], np.asarray(ours)[over])

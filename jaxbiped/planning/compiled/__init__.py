@@ -1,7 +1,18 @@
 """Planners compiled by Numba for a CPU, as functions of JAX arrays and of NumPy arrays."""
 
+from jaxbiped.planning.compiled.crossing import crossing_faces
 from jaxbiped.planning.compiled.heading import settle_headings
 from jaxbiped.planning.compiled.line_sweep import LANES, LANES_LARGE
 from jaxbiped.planning.compiled.settle import METHODS, aligned, settle, settle_arrays, settle_grids
 
-__all__ = ["LANES", "LANES_LARGE", "METHODS", "aligned", "settle", "settle_arrays", "settle_grids", "settle_headings"]
+__all__ = [
+    "LANES",
+    "LANES_LARGE",
+    "METHODS",
+    "aligned",
+    "crossing_faces",
+    "settle",
+    "settle_arrays",
+    "settle_grids",
+    "settle_headings",
+]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Float, Int, Int8
+from jaxtyping import Array, Bool, Float, Int, Int8
 
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning import compiled
 from jaxbiped.planning.costs import DIRECTIONS
 
 WINDOW = 0.20  # [m] radius of the disc of cells around a move that say how its edge runs; as `motion.edge`
@@ -22,17 +24,31 @@ def crossing_faces(classes: Int[Array, "B H W"], levels: Int[Array, "B H W"], pi
     """The direction (of the eight) nearest to the one square to the edge, for the move out of each cell in each.
 
     `motion.edge.crossing_direction` of all moves at once (paper, 2.4), rounded to 45 degrees. It says something of
-    moves over an edge of one level alone; where no edge is seen it is the move's own direction. A move and the move
-    back lie square to the same edge, so that half of them are computed.
+    moves over an edge of one level alone; where no edge is seen it is the move's own direction.
 
     Args:
       pitch: static [m].
     """
-    here = levels.astype(jnp.int32)
     known = (classes != Cell.UNMEASURED) & (classes != Cell.OBSTACLE)
+    if jax.default_backend() == "cpu":
+        return compiled.crossing_faces(known, levels, window(pitch), SLANT)
+    return dense_faces(known, levels, pitch)
+
+
+def window(pitch: float) -> int:
+    """`WINDOW` in cells."""
+    return max(1, round(WINDOW / pitch))
+
+
+def dense_faces(known: Bool[Array, "B H W"], levels: Int[Array, "B H W"], pitch: float) -> Int8[Array, "B 8 H W"]:
+    """The same for an accelerator: of all moves, by convolutions.
+
+    A move and the move back lie square to the same edge, so that half of them are computed.
+    """
+    here = levels.astype(jnp.int32)
     there = jnp.stack([beside(here, *DIRECTIONS[k], NOWHERE) for k in range(4)], axis=1)
     kernel = jnp.asarray(discs(pitch))
-    shape = (len(classes), 4, 3, *classes.shape[1:])
+    shape = (len(known), 4, 3, *known.shape[1:])
 
     def one_level(level, sums):
         # both sums are over cells of one level, each level in its turn: there are few
@@ -51,7 +67,7 @@ def crossing_faces(classes: Int[Array, "B H W"], levels: Int[Array, "B H W"], pi
 
 def discs(pitch: float) -> Float[np.ndarray, "12 1 n n"]:
     """Of the first four directions, over a disc of cells around the middle of the move: one, and the offset (i, j)."""
-    half = max(1, round(WINDOW / pitch))
+    half = window(pitch)
     i, j = np.mgrid[-half : half + 1, -half : half + 1]
     kernels = []
     for di, dj in DIRECTIONS[:4]:
