@@ -73,7 +73,8 @@ def eye(
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
     seed = jnp.asarray(place.seed, jnp.uint32)[None]
     world, mind = standing(*batch, seed, place.poses[number], jnp.int32(number), program(config, AREA))
-    return jax.tree.map(lambda leaf: leaf[0], jax.device_get(where(world, mind, batch[1], None)))
+    origin, basis, at, drawn = jax.tree.map(lambda leaf: leaf[0], jax.device_get(where(world, mind, batch[1], None)))
+    return origin, basis, at, int(drawn)
 
 
 def watch_from(place: Place, number: int, eyes: StereoEyes, settings: Settings, config: MissionConfig) -> Watched:

@@ -56,7 +56,7 @@ def watch(sensor: StereoSensor, origin: Float[np.ndarray, "3"], basis: Float[np.
         np.asarray(origin, float) + np.asarray(basis, float)[:, 0] * camera.baseline, basis
     )
     true = (camera.focal * camera.baseline / pair.depth).astype(np.float32)  # 0 where the depth is infinite
-    return thinned(true, found, seen_by_both(true, pair.depth, far_right), camera.num_disparities - 1)
+    return thinned(true, found, seen_by_both(true, pair.depth, far_right), float(camera.num_disparities - 1))
 
 
 def seen_by_both(
