@@ -5,48 +5,75 @@ from __future__ import annotations
 import time
 import webbrowser
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import pydantic
 import tyro
 
 from jaxbiped.config import Model
-from jaxbiped.report.viewer.page import serve
-from jaxbiped.report.viewer.shown import shown
+from jaxbiped.errors import InputError
+from jaxbiped.mission.strategies import STRATEGIES
+from jaxbiped.report.viewer.missions import Missions, Place, Study, missions
+from jaxbiped.report.viewer.server import refuse_taken, require, serving
 
 
 class ViewArgs(Model):
-    """Show a mission in the browser: arena, robot, points, maps, plan and pictures, at any time of it."""
+    """Show missions in the browser: arena, robot, points, maps, plan and pictures, at any time of them."""
 
     result: tyro.conf.Positional[Path]
-    """A folder that `jaxbiped run` wrote."""
+    """A folder that `jaxbiped run`, `compare`, `sweep` or `reproduce` wrote. Of a study, missions are played again."""
     port: Annotated[int, pydantic.Field(ge=0, le=65535)] = 8080
     """To serve the page on; 0: any that is free."""
     host: str = "127.0.0.1"
     """Address to listen to; 0.0.0.0 lets other machines look, too."""
+    strategy: Literal[tuple(STRATEGIES)] | None = None
+    """Of a study: whose mission to begin with; by default the first there is."""
+    arena: Annotated[int, pydantic.Field(ge=0)] | None = None
+    """Of a study: the arena to begin with; by default that of the median time. Of a folder with several recorded
+    missions: their number."""
+    point: Annotated[int, pydantic.Field(ge=0)] | None = None
+    """Of a sweep: the point to begin with; default 0."""
     browser: bool = True
     """Open the page in the browser."""
     once: bool = False
-    """End after the page has been made, without waiting for Ctrl-C."""
+    """End when the page is there, without waiting for Ctrl-C."""
 
 
 def main(args: ViewArgs) -> int:
     """Run the command; exit status 0.
 
     Raises:
-      InputError: no result, viser is not installed, or the port is taken.
+      InputError: nothing to be shown there, an arena, strategy or point that is not there, viser is not installed, or
+        the port is taken.
     """
-    page = serve(shown(args.result / "mission.npz"), args.host, args.port)
-    url = f"http://{args.host}:{page.server.get_port()}"
-    print(f"{page.mission.title}: {page.mission.ending}")
-    print(f"{url}  (Ctrl-C ends)", flush=True)
-    try:
+    require()
+    refuse_taken(args.host, args.port)
+    found = missions(args.result)
+    at = beginning(found, args)
+    if isinstance(found, Study):
+        print(f"playing arena {at[2]} again, {at[0]}; the first mission takes a minute to compile", flush=True)
+    others = found if isinstance(found, Study) or len(found.choices(*at[:2])) > 1 else None
+    with serving(found.open(*at), args.host, args.port, others, at) as page:
+        url = f"http://{args.host}:{page.server.get_port()}"
+        print(f"{page.mission.title}: {page.mission.ending}")
+        print(f"{url}  (Ctrl-C ends)", flush=True)
         if args.browser and not args.once:
             webbrowser.open(url)
-        while not args.once:
-            time.sleep(3600)
-    except KeyboardInterrupt:
-        print()
-    finally:
-        page.close()
+        try:
+            while not args.once:
+                time.sleep(3600)
+        except KeyboardInterrupt:
+            print()
     return 0
+
+
+def beginning(found: Missions, args: ViewArgs) -> Place:
+    """Strategy, point and arena of the mission to begin with."""
+    if not isinstance(found, Study):
+        for name in ("strategy", "point"):
+            if getattr(args, name) is not None:
+                raise InputError("goes with the folder of a study", field=name, value=getattr(args, name))
+        return "", 0, args.arena or 0
+    strategy, point = args.strategy or found.strategies[0], args.point or 0
+    choices = found.choices(strategy, point)
+    return strategy, point, choices[0].arena if args.arena is None else args.arena

@@ -16,6 +16,7 @@ from jaxbiped.report.pictures import COLOURS
 from jaxbiped.report.viewer import layers, solids
 from jaxbiped.report.viewer.motion import motion
 from jaxbiped.report.viewer.puppet import Puppet
+from jaxbiped.report.viewer.server import serving
 from jaxbiped.report.viewer.shown import Shown
 from tests.report.browser import CHROMIUM, browsing
 from tests.report.test_pictures import mission
@@ -153,7 +154,37 @@ def test_the_puppet_is_the_robot(puppet):
     np.testing.assert_allclose(eye.position[0, 2], 0.03 + robot.head_standing, atol=0.03)
     low, _ = puppet.poses(puppet.home(0.3, 0.4, 0.03, 0.5, True))
     assert corners(low)[:, 2].max() == pytest.approx(0.03 + robot.head_squatting, abs=2e-3)
-    assert motion(mission(), puppet).at(0.0)[2] == pytest.approx(home[2] - 0.03, abs=1e-6)
+
+
+def between_the_feet(puppet, qpos):
+    """Middle between the soles (x, y) and the lower sole's height [m], and the yaw of the feet [rad]."""
+    puppet.poses(qpos)
+    left, right = (puppet.data.site(f"sole_{side}").xpos for side in ("left", "right"))
+    across = left - right
+    return *(left + right)[:2] / 2, min(left[2], right[2]), np.arctan2(-across[0], across[1])
+
+
+def test_a_robot_whose_places_are_known_walks_from_one_to_the_next(puppet):
+    """At each moment it stands where it was; in between a sole is on the ground, and nothing jumps."""
+    places = np.array([[0.1, 0.2, 0.0], [0.15, 0.2, 0.0], [0.186, 0.236, np.pi / 4], [0.186, 0.236, np.pi / 4]])
+    actions = ("Start", "Straight-forward", "Straight-forward", "Look-down")
+    log = replace(mission(4), true_xyyaw=places, action=actions, true_z=np.zeros(4), squat=np.zeros(4, bool))
+    moved = motion(log, puppet, MEASURE)
+    for t, place in zip(log.time, places, strict=True):
+        x, y, z, yaw = between_the_feet(puppet, moved.at(float(t)))
+        assert (x, y, yaw) == pytest.approx(tuple(place), abs=1e-3) and z == pytest.approx(0, abs=1e-3)
+    soles = [between_the_feet(puppet, moved.at(time))[2] for time in np.arange(0.0, 78.0, 0.5)]
+    assert np.abs(soles).max() < 2e-3, "in the air, or in the ground"
+    assert np.abs(np.diff(moved.qpos[:, :3], axis=0)).max() < 0.03
+    legs = moved.qpos[:, 7:]
+    assert np.ptp(legs[:, 3]) > 0.1, "the knees do not bend"
+
+
+def test_what_cannot_be_walked_is_glided(puppet):
+    far = np.array([[0.1, 0.2, 0.0], [1.3, 0.2, 0.0]])
+    log = replace(mission(2), true_xyyaw=far, action=("Start", "Straight-forward"))
+    moved = motion(log, puppet, MEASURE)
+    assert moved.at(0.0)[0] < 0.2 and moved.at(13.0)[0] == pytest.approx(0.7, abs=0.05) and moved.at(26.0)[0] > 1.2
 
 
 def shown():
@@ -164,11 +195,8 @@ def shown():
 def page():
     """The real server on a free port."""
     pytest.importorskip("viser")
-    from jaxbiped.report.viewer.page import serve
-
-    made = serve(shown(), "127.0.0.1", 0)
-    yield made
-    made.close()
+    with serving(shown(), "127.0.0.1", 0) as made:
+        yield made
 
 
 def scene_of(page):
@@ -194,8 +222,7 @@ def test_the_server_gives_page_and_scene(page):
     found = scene_of(page)
     assert {"/arena/floor", "/arena/box_0", "/goal", "/belief", "/robot/torso/0"} <= found["MeshMessage"]
     assert {f"/robot/{name}" for name in page.puppet.bodies} <= found["FrameMessage"]
-    assert {"/map", "/voxels"} <= found["BatchedMeshesMessage"]
-    assert {"/points", "/all_points"} <= found["PointCloudMessage"]
+    assert "/map" in found["BatchedMeshesMessage"] and "/points" in found["PointCloudMessage"]
     assert "/plan" in found["ArrowMessage"] and "/camera" in found["CameraFrustumMessage"]
     assert len(found["GuiCheckboxMessage"]) == 1 and "GuiSliderMessage" in found
     assert "reached: 25 cm" in page.heading.content
@@ -219,7 +246,7 @@ def test_time_moves_the_robot_and_its_map(page):
 def test_layers_are_switched(page):
     handle = page.server.scene.get_handle_by_name
     page.seek(30.0)
-    assert len(handle("/voxels").batched_positions) == 0
+    assert handle("/voxels") is None
     page.boxes["voxels"].value, page.boxes["plan"].value, page.boxes["robot"].value = True, False, False
     for name in ("voxels", "plan", "robot"):
         page.switch(name)
@@ -230,6 +257,7 @@ def test_layers_are_switched(page):
     for name, on in (("voxels", False), ("plan", True), ("robot", True)):
         page.boxes[name].value = on
         page.switch(name)
+    assert handle("/voxels") is None and handle("/plan").visible and handle("/robot/torso").visible
 
 
 def test_playing_goes_on_to_the_end_and_stops(page):
@@ -246,12 +274,13 @@ def test_playing_goes_on_to_the_end_and_stops(page):
 
 
 def test_a_taken_port_and_a_foreign_host_are_named(page):
-    from jaxbiped.report.viewer.page import serve
-
-    with pytest.raises(InputError, match="port: is taken"):
-        serve(shown(), "127.0.0.1", page.server.get_port())
-    with pytest.raises(InputError, match="host: must be an address of this machine"):
-        serve(shown(), "203.0.113.7", 0)
+    with pytest.raises(InputError, match="port: is taken"), serving(shown(), "127.0.0.1", page.server.get_port()):
+        pass
+    with (
+        pytest.raises(InputError, match="host: must be an address of this machine"),
+        serving(shown(), "203.0.113.7", 0),
+    ):
+        pass
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")

@@ -15,6 +15,7 @@ from jaxbiped.report.viewer.solids import height_colours
 TILE, VOXEL = 0.93, 0.88  # shares of a cell and of a voxel that are drawn
 TILE_HEIGHT = 0.0015  # [m] of the tiles' middles above their ground
 LINE_HEIGHT = 0.012  # [m] of plan and track above theirs
+MOST_POINTS, MOST_OF_ALL = 8000, 60000  # shown of one measurement; of all
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,12 @@ def voxels(log: MissionLog, t: int) -> Bricks:
 
 
 def cloud(log: MissionLog, t: int, earlier: bool = False) -> Cloud:
-    """The points of the last measurement, or of all so far; coloured by height."""
+    """The points of the last measurement, or of all so far, coloured by height; of more than are shown, every n-th."""
     if not log.points:
         return Cloud(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
     last = max(0, len(log.points) - 2)  # after the last action nothing was measured: it repeats the one before
     xyz = np.concatenate(log.points[: min(t, last) + 1]) if earlier else log.points[t]
+    xyz = xyz[:: max(1, -(-len(xyz) // (MOST_OF_ALL if earlier else MOST_POINTS)))]
     return Cloud(xyz.astype(float), height_colours(xyz[:, 2]))
 
 

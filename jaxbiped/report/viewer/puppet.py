@@ -63,13 +63,21 @@ class Puppet:
         return self.carried(table.pelvis[-1], table.q[-1], (x, y, z, yaw))
 
     def carried(
-        self, pelvis: Float[np.ndarray, "3"], q: Float[np.ndarray, "12"], at: tuple[float, float, float, float]
+        self,
+        pelvis: Float[np.ndarray, "3"],
+        q: Float[np.ndarray, "12"],
+        at: tuple[float, float, float, float],
+        turned: float = 0.0,
     ) -> Float[np.ndarray, "19"]:
-        """The state with hips at `pelvis` [m] and joints `q` [rad] of a frame that lies at (x, y, z, yaw)."""
+        """The state with hips at `pelvis` [m], joints `q` and the torso turned by `turned` [rad], all in a frame.
+
+        Args:
+          at: the frame's x, y, z [m] and yaw [rad].
+        """
         x, y, z, yaw = at
         cos, sin = np.cos(yaw), np.sin(yaw)
         hips = np.array([x + cos * pelvis[0] - sin * pelvis[1], y + sin * pelvis[0] + cos * pelvis[1], z + pelvis[2]])
-        return home_qpos(self.model, hips, q, yaw)
+        return home_qpos(self.model, hips, q, yaw + turned)
 
 
 def shape(kind: int, size: Float[np.ndarray, "3"]) -> trimesh.Trimesh:

@@ -34,15 +34,18 @@ def shown(path: Path) -> Shown:
     log, facts = load_log(path)
     config = config_of(facts, path)
     title = ", ".join(str(facts[name]) for name in ("scene", "strategy") if name in facts) or path.stem
-    seed = f", seed {facts['seed']}" if "seed" in facts else ""
+    seeds = [each["seed"] for each in (facts, facts.get("args", {})) if "seed" in each]
+    seed = f", seed {seeds[0]}" if seeds else ""
     note = f"sensor {config.sensor}, executor {config.executor}{seed}"
     return Shown(log, config, title, ending(log, facts), note)
 
 
 def config_of(facts: Mapping[str, Any], path: Path) -> MissionConfig:
-    """The mission's config; the default where the file has none."""
+    """The mission's config, or what the file says of it; the default for what it does not say."""
+    said = facts.get("args", {})
+    brief = {name: said[name] for name in ("sensor", "executor") if name in said}
     try:
-        return parse(MissionConfig, facts.get("config", {}), file=path)
+        return parse(MissionConfig, facts.get("config", brief), file=path)
     except InputError as error:
         raise InputError(f"was written by another version: {error}", file=path) from None
 

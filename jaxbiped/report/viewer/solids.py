@@ -17,11 +17,12 @@ from jaxbiped.report.pictures import GOAL_RADIUS, INK
 
 Colour = tuple[int, int, int]
 
-FLOOR_DEPTH = 0.012  # [m] of the floor's slab
+FLOOR_DEPTH, RIM = 0.012, 0.015  # [m] of the floor's slab, and how far it reaches beyond the arena
 MARK_HEIGHT, RING_HEIGHT = 0.0045, 0.006  # [m]: above the tiles of the map
 RING_WIDTH, DASHES, SEGMENTS = 0.008, 16, 64
-FLOOR_COLOUR, MARKS = (250, 250, 251), {"circle": (226, 58, 46), "square": (28, 92, 230)}
+FLOOR_COLOUR, MARKS = (120, 124, 132), {"circle": (226, 58, 46), "square": (28, 92, 230)}
 BOX_COLOURS = {"obstacle": (196, 92, 78), "bump": (116, 156, 205), "gate": (152, 118, 190)}
+TALL, THROUGH = 0.15, 0.5  # [m] height from which boxes are seen through, and their opacity
 LOWEST, HIGHEST = -0.03, 0.45  # [m] of the scale of heights
 
 
@@ -59,13 +60,13 @@ def solids(log: MissionLog) -> tuple[Solid, ...]:
 def floor(log: MissionLog) -> Solid:
     """A slab under the arena."""
     width, depth = (float(side) for side in log.size_xy)
-    mesh = trimesh.creation.box((width, depth, FLOOR_DEPTH))
+    mesh = trimesh.creation.box((width + 2 * RIM, depth + 2 * RIM, FLOOR_DEPTH))
     mesh.apply_translation((width / 2, depth / 2, -FLOOR_DEPTH / 2))
     return solid("arena/floor", mesh, FLOOR_COLOUR)
 
 
 def prism(name: str, outline: Outline) -> Solid:
-    """A box of an arena. Gates are drawn so that what passes below them is seen."""
+    """A box of an arena. One that could hide the robot is drawn so that it is seen through."""
     top, bottom = max(outline.top, outline.bottom + 1e-3), outline.bottom
     corners = np.asarray(outline.corners_xy, float)
     vertices = np.concatenate([np.column_stack([corners, np.full(4, z)]) for z in (bottom, top)])
@@ -74,7 +75,7 @@ def prism(name: str, outline: Outline) -> Solid:
     separate = vertices[quads].reshape(-1, 3)  # corners that faces share would be shaded round
     halves = np.array([[0, 1, 2], [0, 2, 3]])
     faces = (4 * np.arange(len(quads))[:, None, None] + halves).reshape(-1, 3)
-    return Solid(name, separate, faces, BOX_COLOURS[outline.kind], 0.55 if outline.kind == "gate" else 1.0)
+    return Solid(name, separate, faces, BOX_COLOURS[outline.kind], THROUGH if top > TALL else 1.0)
 
 
 def goal(log: MissionLog) -> tuple[Solid, ...]:
