@@ -59,12 +59,18 @@ def main(args: ViewArgs) -> int:
         print(f"{url}  (Ctrl-C ends)", flush=True)
         if args.browser and not args.once:
             webbrowser.open(url)
-        try:
-            while not args.once:
-                time.sleep(3600)
-        except KeyboardInterrupt:
-            print()
+        if not args.once:
+            wait()
     return 0
+
+
+def wait() -> None:
+    """Until Ctrl-C."""
+    try:
+        while True:
+            time.sleep(3600)
+    except KeyboardInterrupt:
+        print()
 
 
 def beginning(found: Missions, args: ViewArgs) -> Place:

@@ -58,14 +58,15 @@ def puppet():
 
 def test_tiles_have_the_colours_of_the_paper_in_their_cells():
     log = seen()
-    bricks = layers.tiles(log, 4)
-    assert len(bricks.centre) == np.sum(log.classes[4] != Cell.UNMEASURED)
+    bricks = layers.tiles(log, 2)
+    assert len(bricks.centre) == log.classes[2].size and Cell.UNMEASURED in log.classes[2]
     for (x, y, z), colour in zip(bricks.centre, bricks.colour, strict=True):
         i, j = int(y / 0.05), int(x / 0.05)
+        cell = Cell(log.classes[2][i, j])
         assert (x, y) == pytest.approx(((j + 0.5) * 0.05, (i + 0.5) * 0.05))
-        assert z == pytest.approx(log.levels[4][i, j] * 0.03 + layers.TILE_HEIGHT)
-        if log.classes[4][i, j] != Cell.BUMP:
-            assert colour.tolist() == [round(255 * c) for c in to_rgb(COLOURS[Cell(log.classes[4][i, j])])]
+        assert z < -0.002 if cell == Cell.UNMEASURED else z == pytest.approx(log.levels[2][i, j] * 0.03 + 0.0015)
+        if cell != Cell.BUMP:
+            assert colour.tolist() == [round(255 * c) for c in to_rgb(COLOURS[cell])]
 
 
 def test_voxels_lie_where_they_are_occupied():
@@ -235,8 +236,13 @@ def test_time_moves_the_robot_and_its_map(page):
     for time in (0.0, 60.0, 104.0):
         page.seek(time)
         places.append(torso.position[0])
-        tiles.append(len(page.server.scene.get_handle_by_name("/map").batched_positions))
+        tiles.append(np.sum(page.server.scene.get_handle_by_name("/map").batched_positions[:, 2] > 0))
         assert f"**{time:.0f} s** of 104 s" in page.said.content and page.slider.value == time
+        doing = {0.0: "Straight-forward", 104.0: "Straight-forward (reached)"}.get(time, "Straight-forward")
+        assert f"**{doing}**" in page.said.content
+    page.seek(70.0)
+    assert "**measuring**" in page.said.content
+    page.seek(104.0)
     assert places[0] < places[1] < places[2] and tiles[0] < tiles[1] < tiles[2]
     assert "reached" in page.said.content
     page.step(-1)
@@ -283,6 +289,7 @@ def test_a_taken_port_and_a_foreign_host_are_named(page):
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
 def test_the_page_is_drawn(page, tmp_path):
     """Of many colours where the arena is: neither blank nor one flat grey."""

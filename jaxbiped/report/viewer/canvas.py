@@ -124,7 +124,7 @@ class Canvas:
             if handle := self.moving.pop(name, None):
                 handle.remove()
         elif name == "map":
-            self.moving[name] = self.bricks(name, layers.tiles(log, t), on)
+            self.map(layers.tiles(log, t), on)
         elif name == "voxels":
             self.moving[name] = self.bricks(name, layers.voxels(log, t), on)
         elif name in ("points", "all_points"):
@@ -149,6 +149,15 @@ class Canvas:
                 x, y, z, yaw = layers.belief(log, t)
                 mark = self.moving[name]
                 mark.position, mark.wxyz = (x, y, z + 0.01), (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
+
+    def map(self, tiles: layers.Bricks, on: bool) -> None:
+        """The tiles; once they are there they are moved and coloured, which does not flicker."""
+        handle = self.moving.get("map")
+        if handle is None:
+            self.moving["map"] = self.bricks("map", tiles, on)
+        else:
+            handle.batched_positions, handle.batched_colors = tiles.centre, linear(tiles.colour)
+            handle.visible = on
 
     def bricks(self, name: str, bricks: layers.Bricks, on: bool) -> Any:
         """Many boxes of one size."""

@@ -13,7 +13,7 @@ from jaxbiped.report.pictures import class_image
 from jaxbiped.report.viewer.solids import height_colours
 
 TILE, VOXEL = 0.93, 0.88  # shares of a cell and of a voxel that are drawn
-TILE_HEIGHT = 0.0015  # [m] of the tiles' middles above their ground
+TILE_HEIGHT, IN_FLOOR = 0.0015, -0.006  # [m] of the tiles' middles above their ground; of those not to be seen
 LINE_HEIGHT = 0.012  # [m] of plan and track above theirs
 MOST_POINTS, MOST_OF_ALL = 8000, 60000  # shown of one measurement; of all
 
@@ -41,12 +41,13 @@ def moment_at(log: MissionLog, time: float) -> int:
 
 
 def tiles(log: MissionLog, t: int) -> Bricks:
-    """The classed grid, a tile a cell that is measured, each on the level of its ground."""
-    rows, columns = np.nonzero(log.classes[t] != Cell.UNMEASURED)
-    z = np.maximum(log.levels[t][rows, columns].astype(float), 0) * log.level_height + TILE_HEIGHT
-    centre = np.column_stack([centres(log, rows, columns), z])
+    """The classed grid, a tile a cell, each on the level of its ground; those of unmeasured cells lie in the floor."""
+    rows, columns = np.indices(log.classes[t].shape).reshape(2, -1)
+    z = np.maximum(log.levels[t].ravel().astype(float), 0) * log.level_height + TILE_HEIGHT
+    z[log.classes[t].ravel() == Cell.UNMEASURED] = IN_FLOOR
     side = TILE * log.pitch
-    return Bricks((side, side, 0.002), centre, class_image(log.classes[t], log.levels[t])[rows, columns])
+    colours = class_image(log.classes[t], log.levels[t]).reshape(-1, 3)
+    return Bricks((side, side, 0.002), np.column_stack([centres(log, rows, columns), z]), colours)
 
 
 def voxels(log: MissionLog, t: int) -> Bricks:

@@ -14,7 +14,7 @@ from jaxbiped.report.animation import disparity_image
 from jaxbiped.report.viewer.canvas import FIELD_OF_VIEW, LAYERS, Canvas, viewpoint
 from jaxbiped.report.viewer.layers import moment_at
 from jaxbiped.report.viewer.missions import Missions, Place
-from jaxbiped.report.viewer.motion import motion
+from jaxbiped.report.viewer.motion import arrivals, motion
 from jaxbiped.report.viewer.picker import Picker
 from jaxbiped.report.viewer.puppet import Puppet
 from jaxbiped.report.viewer.shown import Shown
@@ -83,7 +83,8 @@ class Page:
             self.mission = mission
             if self.puppet is None or self.puppet.robot != mission.config.walk.biped:
                 self.puppet = Puppet(mission.config.walk.biped)
-            self.motion = motion(log, self.puppet, mission.config.durations.measure)
+            measure = mission.config.durations.measure
+            self.motion, self.ends = motion(log, self.puppet, measure), np.append(arrivals(log, measure), log.time[-1])
             self.canvas.show(mission, self.puppet)
             self.heading.content = f"### {mission.title}\n{mission.ending}\n\n{mission.note}"
             self.slider.value, self.slider.max = 0, max(1, math.ceil(log.time[-1]))
@@ -147,7 +148,7 @@ class Page:
                     self.left.image = log.pictures[t].left
                     self.disparity.image = disparity_image(log.pictures[t], self.nearest)
             self.canvas.pose(self.puppet, self.motion.at(self.time), log.action[t] == LOOKED_DOWN)
-            said = status(log, t, self.time)
+            said = status(log, t, self.time, float(self.ends[min(t, len(self.ends) - 1)]))
             if said != self.said.content:
                 self.said.content = said
 

@@ -13,13 +13,18 @@ BELIEF = "#d06000"
 HEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4)  # [m] of the legend
 
 
-def status(log: MissionLog, t: int, time: float) -> str:
-    """Where a mission is, in Markdown."""
+def status(log: MissionLog, t: int, time: float, arrived: float) -> str:
+    """Where a mission is at a time [s], in Markdown.
+
+    Args:
+      t: its moment.
+      arrived: [s] when what is done after this moment will have been done; then it measures.
+    """
     last = len(log.time) - 1
-    doing = caption(log, t) if t == last else f"{log.action[t + 1]}, next"
+    doing = caption(log, t) if t == last else log.action[t + 1] if time < arrived else "measuring"
     plan = f"{len(log.plan[t])} cells to go" if len(log.plan[t]) else "no plan"
-    measured = f"measurement {min(t + 1, max(last, 1))} of {max(last, 1)}"
-    return f"**{time:.0f} s** of {log.time[-1]:.0f} s · {measured} · {doing} · {plan}"
+    measured = f"{min(t + 1, max(last, 1))} of {max(last, 1)} measurements"
+    return f"**{time:.0f} s** of {log.time[-1]:.0f} s · {measured}\n\n**{doing}**" + (f" · {plan}" if t < last else "")
 
 
 def legend() -> str:
