@@ -12,10 +12,10 @@ import numpy as np
 from numba import carray, njit
 
 from jaxbiped.planning.compiled import foreign
+from jaxbiped.planning.compiled import heading_sweep as sweep
 from jaxbiped.planning.costs import DIRECTIONS
 
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
-NAME = "jaxbiped_heading_dijkstra"
 LOCK = Lock()
 
 
@@ -69,13 +69,15 @@ def solve(arguments, count, results):
 
 
 @cache
-def registered() -> str:
-    """The name by which XLA knows the kernel; compiled at the first call."""
-    foreign.register(NAME, solve)
-    return NAME
+def registered(method: str, double: bool) -> tuple[str, int]:
+    """The name by which XLA knows a kernel, and its lanes; compiled at the first call. "dijkstra" is always float64."""
+    name = f"jaxbiped_heading_{method}_{'float64' if double else 'float32'}"
+    lanes = 1 if method == "dijkstra" else sweep.LANES_LARGE if double else sweep.LANES
+    foreign.register(name, solve if method == "dijkstra" else sweep.solver(lanes, np.float64 if double else np.float32))
+    return name, lanes
 
 
-def settle_headings(time, face, turn, goal_ij):
+def settle_headings(time, face, turn, goal_ij, method: str, double: bool):
     """Least time [B, 8, H, W] float32 from each heading and cell to the goal, in any heading there.
 
     Args:
@@ -84,8 +86,13 @@ def settle_headings(time, face, turn, goal_ij):
       face: the heading in which each is made, at most one eighth off its direction; int8 [B, 8, H, W].
       turn: of one eighth, float32 [B], not negative.
       goal_ij: [B, 2]; nothing is reached from one outside the grid.
+      method: "line_sweep" or "dijkstra".
+      double: sums are float64; with "dijkstra" they always are.
     """
     with LOCK:
-        name = registered()
-    result = jax.ShapeDtypeStruct(time.shape, jnp.float32)
-    return jax.ffi.ffi_call(name, result)(time, face, turn, goal_ij.astype(jnp.int32))
+        name, lanes = registered(method, double or method == "dijkstra")
+    batch = len(time)
+    inputs = time, face, turn, goal_ij.astype(jnp.int32)
+    if batch < lanes:
+        inputs = [jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1)) for a in inputs]
+    return jax.ffi.ffi_call(name, jax.ShapeDtypeStruct(inputs[0].shape, jnp.float32))(*inputs)[:batch]

@@ -14,9 +14,10 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled
 from jaxbiped.planning.costs import BASE_PITCH, DIRECTIONS, Rules
+from jaxbiped.planning.field import FEW, LARGE
 from jaxbiped.planning.heading.times import Moves, Times, heading_moves
 
-METHODS = ("wavefront", "dijkstra")
+METHODS = ("wavefront", "line_sweep", "dijkstra")
 
 
 @jax.tree_util.register_dataclass
@@ -49,7 +50,8 @@ def heading_field(
     Args:
       classes, levels, times, rules, pitch, extra: see `heading_moves`; Table 2's times by default.
       goal_ij: row and column; a goal outside the grid is reached from nowhere.
-      method: static: "wavefront" (any device), "dijkstra" (CPU), or "auto": Dijkstra on a CPU, else the wavefront.
+      method: static: "wavefront" (any device), "line_sweep" or "dijkstra" (CPU), or "auto": line sweeps on a CPU,
+        Dijkstra there for few large grids, the wavefront elsewhere.
 
     Raises:
       InputError: no goal, or a method that this device does not have.
@@ -60,8 +62,9 @@ def heading_field(
     allowed = METHODS if on_cpu else METHODS[:1]
     if method not in ("auto", *allowed):
         raise InputError(f"must be one of auto, {', '.join(allowed)} on this device", field="method", value=method)
+    large = classes.shape[1] * classes.shape[2] > LARGE
     if method == "auto":
-        method = "dijkstra" if on_cpu else "wavefront"
+        method = ("dijkstra" if large and len(classes) < FEW else "line_sweep") if on_cpu else "wavefront"
     batch = classes.shape[:1]
     times, rules = (  # of one type, whatever they were given as: one program
         jax.tree.map(lambda leaf, kind=kind: jnp.broadcast_to(jnp.asarray(leaf, kind), batch), tree)
@@ -79,8 +82,13 @@ def settled(classes, levels, times: Times, rules: Rules, goal_ij, extra, pitch: 
     times = jax.tree.map(lambda leaf: jnp.where(valid, leaf, 0.0), times)
     moves = heading_moves(classes, levels, times, rules, pitch, extra)
     goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing is reached
-    settle = compiled.settle_headings if method == "dijkstra" else wavefront
-    return HeadingField(settle(moves.time, moves.face, times.turn, goal_ij), moves, times.turn, valid)
+    inputs = moves.time, moves.face, times.turn, goal_ij
+    if method == "wavefront":
+        cost = wavefront(*inputs)
+    else:
+        large = classes.shape[1] * classes.shape[2] > LARGE  # long sums drift as float32
+        cost = compiled.settle_headings(*inputs, method, large)
+    return HeadingField(cost, moves, times.turn, valid)
 
 
 def wavefront(
