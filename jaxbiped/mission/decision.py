@@ -80,7 +80,7 @@ def perceive(
     mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program
 ) -> tuple[Mind, Int[Array, "B H W"], Int[Array, "B H W"], Int[Array, "B 2"]]:
     """Each robot after a measurement: its mind, the classed map, and its cell."""
-    mind = jax.vmap(localise, in_axes=(0, 0, 0, None))(mind, sightings, arena.landmarks, program)
+    mind = jax.vmap(localise, in_axes=(0, 0, 0, 0, 0, None))(mind, view, sightings, arena.landmarks, settings, program)
     mind = begin_maps(mind, settings, program.spec)
     return jax.vmap(read_map, in_axes=(0, 0, 0, None))(mind, view, settings, program)
 

@@ -13,7 +13,9 @@ from jaxtyping import Array, Bool, Float, UInt32
 
 from jaxbiped.arenas.arena import Arena, Landmarks
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.settings import VISUAL, Program, Settings
+from jaxbiped.mapping import level_view
+from jaxbiped.mapping.scan_match import add_walls, find_walls, match, picture_shape
+from jaxbiped.mission.settings import ICP, VISUAL, Program, Settings
 from jaxbiped.mission.state import Anchor, Mind, World
 from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.localisation import Belief, correct, predict_seen
@@ -21,12 +23,17 @@ from jaxbiped.sensing.motion import track
 from jaxbiped.sensing.view import Sightings, View
 
 
-def localise(mind: Mind, sightings: Sightings, landmarks: Landmarks, program: Program) -> Mind:
+def localise(
+    mind: Mind, view: View, sightings: Sightings, landmarks: Landmarks, settings: Settings, program: Program
+) -> Mind:
     """The mind after what a view tells of the robot's pose."""
     if program.localisation == "landmarks":
         return replace(mind, belief=correct(mind.belief, landmarks, sightings))
     if program.localisation in VISUAL:
         mind = replace(mind, belief=by_motion(mind, sightings))
+    if program.localisation in ICP:
+        mind = by_walls(mind, view, settings, program)
+    if program.localisation in VISUAL:
         zero = jnp.zeros(3)
         here = Anchor(mind.belief, mind.look, mind.squat, zero, zero, jnp.ones_like(mind.fresh))
         mind = replace(mind, anchor=here)
@@ -40,6 +47,17 @@ def by_motion(mind: Mind, sightings: Sightings) -> Belief:
     good = good & anchor.some
     pose = Pose(belief.pose.x, belief.pose.y, mind.belief.pose.z, belief.pose.yaw)  # heights are counted
     return choose(good, Belief(pose, belief.cov), mind.belief)
+
+
+def by_walls(mind: Mind, view: View, settings: Settings, program: Program) -> Mind:
+    """The mind after the walls in view were laid onto those measured before, and were kept with them."""
+    spec, image = program.spec, program.image
+    support = jnp.round(mind.belief.pose.z / spec.level_height).astype(jnp.int32)
+    flat = jax.lax.optimization_barrier(level_view(view, support, settings.mapping, spec))
+    shape, step = picture_shape(view.x.shape[-1], image.width, image.height)
+    walls = find_walls(flat, shape, step, mind.belief.pose.z)
+    belief = match(mind.belief, walls, mind.outlines, spec)
+    return replace(mind, belief=belief, outlines=add_walls(mind.outlines, walls, belief.pose, spec))
 
 
 def choose(good: Bool[Array, ""], new: Belief, old: Belief) -> Belief:

@@ -34,7 +34,8 @@ SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinemati
 # stereo camera, as wide as the body, sweeps 12 cm to either side
 BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
 SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
-VISUAL = ("visual",)  # localisations that measure the motion between two views
+VISUAL = ("visual", "both")  # localisations that measure the motion between two views
+ICP = ("icp", "both")  # those that measure the pose by walls that were measured before
 
 # Bounded so that sums of costs along a path keep their differences in single precision.
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
@@ -87,10 +88,10 @@ class MissionConfig(Model):
     executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
     """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
     MuJoCo's own batch or in MJX."""
-    localisation: Literal["landmarks", "odometry", "visual"] = "landmarks"
-    """How the robot knows where it stands: dead reckoning, corrected by landmarks, by nothing, or by the motion that
-    what both of two views show tells (not in the paper). Without landmarks there are none in the arena. The sensor
-    `oracle` knows the pose."""
+    localisation: Literal["landmarks", "odometry", "visual", "icp", "both"] = "landmarks"
+    """How the robot knows where it stands: dead reckoning, corrected by landmarks, by nothing (`odometry`), by the
+    motion that two views tell (`visual`), by walls measured before (`icp`), or by the last two. The paper has the
+    first alone; without landmarks there are none in the arena. The sensor `oracle` knows the pose."""
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False

@@ -12,8 +12,9 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import GridMap, GridSpec, empty
+from jaxbiped.mapping.scan_match import Outlines, no_outlines
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import VISUAL, Settings
+from jaxbiped.mission.settings import ICP, VISUAL, Settings
 from jaxbiped.sensing.edges import Edge, unknown
 from jaxbiped.sensing.localisation import Belief
 
@@ -77,6 +78,7 @@ class Mind:
     behind: Edge  # that it crossed last
     since: Float[Array, "*B"]  # [s] from the last measurement to the next
     anchor: Anchor | None = None  # only where its motion is measured
+    outlines: Outlines | None = None  # of walls; only where it localises by these
 
 
 def start(
@@ -94,5 +96,6 @@ def start(
     world = World(pose, no, none, none, zero, zero, code, seed, none, none, before=pose if visual else None)
     level = jnp.round(pose.z / spec.level_height)
     belief = Belief(Pose(x, y, level * spec.level_height, yaw), jnp.diag(settings.limits.start_variance))
+    outlines = no_outlines(spec) if localisation in ICP else None
     anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None
-    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown(), none, anchor)
+    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown(), none, anchor, outlines)

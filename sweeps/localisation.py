@@ -1,0 +1,104 @@
+"""Self-localisation with and without landmarks, on the same arenas with the same noise.
+
+    python sweeps/localisation.py [--arenas N] [--executor kinematic|sampled|native] [--sensor raycast|stereo]
+        [--scenes] [--preset NAME]
+
+Printed for each way of localisation: how many missions reach the goal, the paired difference to landmarks with its
+interval (Tango) and McNemar's p, and how far off the robot believes to stand when it gets there.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+
+from jaxbiped.arenas import load_scene
+from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.mission.eyes import eyes_for
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.queue import Result, stack
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
+from jaxbiped.sensing.hashing import from_key
+from jaxbiped.study.evaluate import draw, run_all, run_one_by_one
+from jaxbiped.study.paired import success_difference
+from jaxbiped.study.walks import walk_all
+
+SCENES = sorted((Path(__file__).parent.parent / "configs" / "scenes").glob("experiment_*.toml"))
+WAYS = ("landmarks", "odometry", "visual", "icp", "both")
+
+
+def play(config: MissionConfig, batch, seeds, count: int, strategy: str) -> Result:
+    """Missions of one kind on a batch of arenas: leaves [count]."""
+    static = program(config, (SIZE_X, SIZE_Y))
+    points, one = stack([config.settings(strategy)]), np.zeros(1, int)
+    arguments = batch, seeds, points, count, static, lambda _: None
+    eyes = eyes_for(config)
+    if config.executor in SIMULATED:
+        result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
+    elif eyes:
+        result = run_one_by_one(*arguments, eyes, population_of=one)
+    else:
+        result = run_all(*arguments)
+    if eyes:
+        eyes.close()
+    return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
+
+
+def scenes() -> tuple:
+    """The scenes of the paper's experiments, and the seeds of their noise."""
+    arenas = [load_scene(path)[1] for path in SCENES]
+    seeds = jnp.stack([from_key(jax.random.key(number)) for number in range(len(SCENES))])
+    return jax.tree.map(jnp.asarray, stack(arenas)), seeds, len(SCENES)
+
+
+def main(
+    arenas: int = 300,
+    executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic",
+    sensor: Literal["raycast", "stereo"] = "raycast",
+    ways: tuple[Literal[WAYS], ...] = WAYS,
+    scenes_only: bool = False,
+    preset: str = "rendered",
+    seed: int = 0,
+    strategy: str = "full",
+) -> None:
+    """Run `arenas` random arenas of all families, or the six scenes, with each way of localisation."""
+    batch, seeds = draw(jax.random.key(seed), jnp.arange(arenas), FAMILIES)
+    if scenes_only:
+        batch, seeds, arenas = scenes()
+    what = f"{arenas} {'scenes' if scenes_only else 'random arenas'}, strategy {strategy}"
+    columns = "localisation", "reached", "less landmarks", "p", "off at the goal", "95 %", "of yaw", "95 %", "wall"
+    table = Table(*columns, title=f"{what}, executor {executor}, sensor {sensor}, preset {preset}")
+    reached = {}
+    for way in ways:
+        begun = time.time()
+        config = MissionConfig(executor=executor, sensor=sensor, localisation=way, preset=preset)
+        result = play(config, batch, seeds, arenas, strategy)
+        there = reached[way] = result.code == Code.REACHED
+        difference = "", ""
+        if way != ways[0] == "landmarks":
+            found = success_difference(there, reached["landmarks"])
+            interval = f"[{100 * found.low:+.1f}, {100 * found.high:+.1f}]"
+            difference = f"{100 * found.estimate:+.1f} points {interval}", f"{found.p:.3f}"
+        off, turned = (np.percentile(error[there], (50, 95)) if there.any() else np.full(2, np.nan)
+                       for error in (result.pose_error, np.rad2deg(result.yaw_error)))  # fmt: skip
+        table.add_row(
+            way,
+            f"{there.mean():.1%}",
+            *difference,
+            *(f"{100 * value:.2f} cm" for value in off),
+            *(f"{value:.2f} deg" for value in turned),
+            f"{time.time() - begun:.0f} s",
+        )
+    Console(width=130).print(table)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
