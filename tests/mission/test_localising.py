@@ -1,0 +1,146 @@
+"""Localisation without landmarks: what a mind makes of it, and missions in arenas where there is nothing to go by."""
+
+from dataclasses import replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxbiped.arenas import load_scene
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.eyes import eyes_for, view_names
+from jaxbiped.mission.localising import carried_on, localise, unmarked
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.state import start
+from jaxbiped.mission.stepped import run_bare
+from jaxbiped.sensing import Motion, Sightings, View, predict
+from jaxbiped.sensing.hashing import from_key
+
+AREA = (1.8, 1.4)
+MOVED, VARIANCES = jnp.array([0.05, 0.0, 0.0]), jnp.array([1e-6, 1e-6, 1e-4])
+WAYS = "odometry", "visual", "icp", "both"
+
+
+def kind(way: str, **other):
+    """Settings and program of one way of localisation."""
+    config = MissionConfig(localisation=way, **other)
+    return config.settings("full"), program(config, AREA)
+
+
+@pytest.fixture(scope="module")
+def arena(request):
+    return load_scene(request.config.rootpath / "configs" / "scenes" / "experiment_1.toml")[1]
+
+
+def begin(arena, way: str):
+    settings, static = kind(way)
+    world, mind = start(arena, settings, jnp.uint32(5), static.spec, static.localisation)
+    return world, mind, settings, static
+
+
+def blank_view(static) -> View:
+    return View(*(jnp.zeros(static.image.rows * static.image.columns),) * 4)
+
+
+def sightings_of(arena, motion=None) -> Sightings:
+    zero = jnp.zeros_like(arena.landmarks.x)
+    return Sightings(zero, zero, zero, zero > 0, motion)
+
+
+def told(x=0.048, seen=True) -> Motion:
+    return Motion(jnp.float32(x), jnp.float32(0), jnp.float32(0.01), jnp.eye(3) * 1e-8, jnp.bool_(seen))
+
+
+def stepped(mind):
+    """After one command, by odometry."""
+    belief = predict(mind.belief, *MOVED, VARIANCES)
+    return replace(carried_on(mind, MOVED, VARIANCES), belief=belief)
+
+
+@pytest.mark.parametrize("seen", [True, False])
+def test_motion_between_views_takes_the_place_of_odometry(arena, seen):
+    _, mind, settings, static = begin(arena, "visual")
+    apply = jax.jit(partial(localise, program=static))
+    view, marks = blank_view(static), arena.landmarks
+    first = apply(mind, view, sightings_of(arena, told()), marks, settings)  # before the first view none was moved from
+    np.testing.assert_array_equal(first.belief.pose.x, mind.belief.pose.x)
+    assert first.anchor.some
+    moved = stepped(first)
+    after = apply(moved, view, sightings_of(arena, told(seen=seen)), marks, settings)
+    yaw = float(arena.start_xyyaw[2])
+    gone = float(after.belief.pose.x - mind.belief.pose.x)
+    assert gone == pytest.approx((0.048 if seen else 0.05) * np.cos(yaw), abs=1e-4)
+    assert (after.belief.cov[2, 2] < moved.belief.cov[2, 2] - 5e-5) == seen
+
+
+@pytest.mark.parametrize("way", ["odometry", "icp"])
+def test_nothing_in_view_leaves_dead_reckoning(arena, way):
+    _, mind, settings, static = begin(arena, way)
+    moved = stepped(mind)
+    after = jax.jit(partial(localise, program=static))(
+        moved, blank_view(static), sightings_of(arena), arena.landmarks, settings
+    )
+    for a, b in zip(jax.tree.leaves(after.belief), jax.tree.leaves(moved.belief), strict=True):
+        np.testing.assert_array_equal(a, b)
+    assert (after.outlines is None) == (way == "odometry") and after.anchor is None
+
+
+def test_ray_cast_sensor_has_no_landmarks_then(arena):
+    for way in WAYS:
+        world, mind, settings, static = begin(arena, way)
+        seen = unmarked(blank_view(static), world, mind, arena, settings, static, jnp.uint32(1))
+        assert not np.any(seen.seen)
+        assert (seen.motion is None) == (way in ("odometry", "icp"))
+        assert seen.motion is None or not seen.motion.seen
+
+
+def test_oracle_knows_its_pose_whatever_it_is_told():
+    assert kind("visual", sensor="oracle")[1].localisation == "landmarks"
+    assert kind("both")[1].localisation == "both"
+
+
+def test_names_of_views_follow_each_other(arena):
+    """A view is asked for, after the next command, by the name that it was kept under."""
+    world, mind, settings, static = begin(arena, "visual")
+    batch = lambda *trees: jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], trees)  # noqa: E731
+    now, then = view_names(*batch(world, mind))
+    assert not np.any(then)
+    after = localise(mind, blank_view(static), sightings_of(arena, told(seen=False)), arena.landmarks, settings, static)
+    after = replace(after, look=~after.look)  # how the next one is held is not how this one was
+    place = Pose(world.pose.x + 0.05, world.pose.y, world.pose.z, world.pose.yaw)
+    world = replace(world, pose=place, before=world.pose, decisions=world.decisions + 1)
+    later, asked = view_names(*batch(world, after))
+    np.testing.assert_array_equal(asked, now)
+    assert np.any(later != now)
+
+
+def plain(arena):
+    """The same without any texture, and without landmarks."""
+    boxes = replace(arena.boxes, contrast=jnp.zeros_like(arena.boxes.contrast))
+    marks = replace(arena.landmarks, used=jnp.zeros_like(arena.landmarks.used))
+    return replace(arena, boxes=boxes, landmarks=marks, floor_contrast=jnp.float32(0))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("sensor", "way"), [("raycast", "both"), ("stereo", "visual")])
+def test_missions_where_nothing_can_be_seen_end(arena, sensor, way):
+    """Without texture nothing is measured: no path is found, and the numbers stay numbers."""
+    settings, static = kind(way, sensor=sensor)
+    eyes = eyes_for(MissionConfig(localisation=way, sensor=sensor))
+    world = run_bare(plain(arena), settings, from_key(jax.random.key(0)), static, eyes)
+    if eyes:
+        eyes.close()
+    assert world.code[0] in (Code.NO_PATH, Code.REACHED, Code.COLLIDED, Code.OUT_OF_STEPS)
+    assert np.isfinite(world.pose_error[0] + world.yaw_error[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("way", WAYS)
+def test_missions_go_by_each_way(arena, way):
+    """The scene of experiment 1 is solved, and the robot is right about where it stands within 6 cm."""
+    settings, static = kind(way)
+    world = run_bare(arena, settings, from_key(jax.random.key(0)), static)
+    assert world.code[0] == Code.REACHED and world.pose_error[0] < 0.06
