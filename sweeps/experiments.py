@@ -8,6 +8,8 @@ those that reached the goal.
 
 from __future__ import annotations
 
+import contextlib
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -19,12 +21,13 @@ from rich.console import Console
 from rich.table import Table
 
 from jaxbiped.arenas import load_scene
-from jaxbiped.mission.eyes import eyes_for
+from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.evaluate import run_all, run_one_by_one
+from jaxbiped.study.evaluate import run_all
+from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.study.walks import walk_all
 
@@ -40,15 +43,14 @@ def play(item: Experiment, config: MissionConfig, seeds: int):
     points = stack([config.settings(item.strategy)])
     arguments = batch, noise, points, seeds, static, lambda _: None
     one = np.zeros(1, int)
-    eyes = eyes_for(config)
+    see = partial(open_eyes, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
-        result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
-    elif eyes:
-        result = run_one_by_one(*arguments, eyes, population_of=one)
+        with see() if see else contextlib.nullcontext() as eyes:
+            result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
+    elif see:
+        result = run_on_host(*arguments, see, population_of=one)
     else:
         result = run_all(*arguments, workers=1, slots=seeds)
-    if eyes:
-        eyes.close()
     return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
 
 

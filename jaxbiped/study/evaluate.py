@@ -19,7 +19,6 @@ from jaxbiped import arenas as arena_room
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
 from jaxbiped.devices import by_rows, mesh_of
-from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import (
@@ -30,15 +29,13 @@ from jaxbiped.mission.queue import (
     Tally,
     Work,
     compile_queue,
-    ending,
-    no_results,
     stack,
 )
 from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards
+from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.schema import KNOWN, SCENE, SCHEMA
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
@@ -100,15 +97,13 @@ def compute(
     batch, seeds = draw(jax.random.key(config.seed), index, config.families, group.populations)
     play = partial(run_all, workers=workers)
     with contextlib.ExitStack() as stack:
-        eyes = StereoEyes(group.camera, group.static.localisation) if group.camera else None
-        if eyes:
-            stack.enter_context(contextlib.closing(eyes))
+        see = partial(open_eyes, group.camera, group.static.localisation) if group.camera else None
         if group.walk is not None:
             from jaxbiped.study.walks import walk_all  # loads MuJoCo
 
-            play = partial(walk_all, config=group.walk, eyes=eyes)
-        elif eyes:
-            play = partial(run_one_by_one, eyes=eyes)
+            play = partial(walk_all, config=group.walk, eyes=stack.enter_context(see()) if see else None)
+        elif see:
+            play = partial(run_on_host, open_eyes=see, workers=workers)
         result = play(
             batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
         )
@@ -217,34 +212,6 @@ def run_threads(
         except BaseException:
             stop.set()  # an interrupt shall not wait for the whole shard
             raise
-
-
-def run_one_by_one(
-    batch: Arena,
-    seeds: UInt32[Array, "A"],
-    points: Settings,
-    count: int,
-    static: Program,
-    on_progress: OnProgress,
-    eyes: Eyes,
-    population_of: Int[np.ndarray, "P"],
-) -> Result:
-    """As `run_all`, one mission after the other, for a sensor that measures on the host."""
-    size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
-    out = no_results(kinds, count)
-    done = Tally(0, 0)
-    for arena_number, point in np.ndindex(count, kinds):
-        arena, settings = (
-            jax.tree.map(lambda leaf, row=row: leaf[row], tree)
-            for tree, row in ((batch, size * population_of[point] + arena_number), (points, point))
-        )
-        world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, eyes))
-        last = jax.device_get(ending(world, arena.goal_xy))
-        for column, value in zip(jax.tree.leaves(out), jax.tree.leaves(last), strict=True):
-            column[point, arena_number] = value[0]
-        done = done + Tally(1, int(world.code[0] == Code.REACHED))
-        on_progress(done)
-    return out
 
 
 def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:

@@ -1,5 +1,6 @@
 """Missions that see on the host: the same as those that see inside the compiled loop, whatever they see with."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 
@@ -9,13 +10,14 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.scene import load_scene
+from jaxbiped.errors import InputError
 from jaxbiped.mission.cycle import cycle, sense
 from jaxbiped.mission.eyes import eyes_for, where
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import start
 from jaxbiped.sensing import camera as cameras
-from jaxbiped.study.evaluate import run_one_by_one
+from jaxbiped.study.hosted import run_on_host
 from tests.mission.conftest import CONFIG, PROGRAM
 
 by_ray_cast = jax.jit(jax.vmap(partial(sense, program=PROGRAM, carriage=None)))
@@ -33,12 +35,13 @@ class Mirror:
 
 @pytest.mark.slow
 def test_missions_that_are_given_what_they_see(population, played):
-    """Two missions, one by one, as a study runs them: those of the queue."""
+    """Two missions, each in a thread, as a study runs them: those of the queue."""
     batch, seeds = jax.tree.map(lambda *rows: jnp.asarray(np.stack(rows)), *population[0][:2]), population[2][:2]
     points = stack(population[1][:1])
     ended = []
-    result = run_one_by_one(
-        batch, jnp.asarray(seeds), points, 2, PROGRAM, ended.append, Mirror(), population_of=np.zeros(1, int)
+    opened = lambda: nullcontext(Mirror())  # noqa: E731
+    result = run_on_host(
+        batch, jnp.asarray(seeds), points, 2, PROGRAM, ended.append, opened, population_of=np.zeros(1, int)
     )
     for k in np.flatnonzero([setting is population[1][0] for setting in population[1][:2]]):
         for name in ("code", "measurements", "decisions"):
@@ -46,6 +49,22 @@ def test_missions_that_are_given_what_they_see(population, played):
         for name in ("distance", "time", "goal_distance"):
             assert getattr(result, name)[0, k] == pytest.approx(getattr(played, name)[k], 1e-5), name
     assert [tally.ended for tally in ended] == [1, 2]
+
+
+def test_eyes_that_cannot_be_opened_end_all_missions(first_look):
+    _, _, arena, settings = first_look
+    tried = []
+
+    def broken():
+        tried.append(1)
+        raise InputError("nothing can be rendered", field="sensor")
+
+    batch = jax.tree.map(lambda leaf: jnp.repeat(leaf, 9, axis=0), arena)
+    with pytest.raises(InputError, match="nothing can be rendered"):
+        run_on_host(
+            batch, jnp.zeros(9, jnp.uint32), settings, 9, PROGRAM, print, broken, population_of=np.zeros(1, int)
+        )
+    assert 1 <= len(tried) <= 2
 
 
 def test_loop_does_not_stand_in_for_a_sensor_on_the_host(first_look):

@@ -1,0 +1,89 @@
+"""Missions whose robots measure on the host, by rendered stereo: several at once, each stepped in a thread."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager
+
+import jax
+import numpy as np
+from jaxtyping import Array, Int, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.mission.eyes import Eyes, StereoEyes
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.queue import OnProgress, Result, Tally, ending, no_results
+from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.stepped import run_bare
+from jaxbiped.sensing.camera import CameraConfig
+
+
+def run_on_host(
+    batch: Arena,
+    seeds: UInt32[Array, "A"],
+    points: Settings,
+    count: int,
+    static: Program,
+    on_progress: OnProgress,
+    open_eyes: Callable[[], AbstractContextManager[Eyes]],
+    population_of: Int[np.ndarray, "P"],
+    workers: int = 2,
+) -> Result:
+    """As `evaluate.run_all`, for a sensor that measures on the host: each worker is a thread with eyes of its own.
+
+    OpenGL and OpenCV work while the other thread has the interpreter. Which of them plays a mission does not change its
+    result.
+
+    Args:
+      open_eyes: makes eyes, in the thread that uses them, and closes them there.
+      workers: one for each core that there is; OpenGL and OpenCV have threads of their own beside.
+    """
+    size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
+    out, left = no_results(kinds, count), np.ndindex(count, kinds)
+    done, lock, stop = Tally(0, 0), threading.Lock(), threading.Event()
+
+    def play(_: int) -> None:
+        nonlocal done
+        with contextlib.ExitStack() as stack:
+            with lock:
+                eyes = stack.enter_context(open_eyes())
+            while not stop.is_set():
+                with lock:
+                    job = next(left, None)
+                if job is None:
+                    return
+                arena_number, point = job
+                arena, settings = (
+                    jax.tree.map(lambda leaf, row=row: leaf[row], tree)
+                    for tree, row in ((batch, size * population_of[point] + arena_number), (points, point))
+                )
+                world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, eyes))
+                last = jax.device_get(ending(world, arena.goal_xy))
+                with lock:
+                    for column, value in zip(jax.tree.leaves(out), jax.tree.leaves(last), strict=True):
+                        column[point, arena_number] = value[0]
+                    done = done + Tally(1, int(world.code[0] == Code.REACHED))
+                    on_progress(done)
+
+    def play_or_stop(number: int) -> None:
+        try:
+            play(number)
+        except BaseException:
+            stop.set()  # neither an interrupt nor an error shall wait for all the missions that are left
+            raise
+
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            list(pool.map(play_or_stop, range(min(workers, count * kinds))))
+        except BaseException:
+            stop.set()
+            raise
+    return out
+
+
+def open_eyes(camera: CameraConfig, localisation: str) -> contextlib.closing[StereoEyes]:
+    """Rendered stereo, until it is closed; both in the thread that uses it."""
+    return contextlib.closing(StereoEyes(camera, localisation))
