@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import jax
+import polars as pl
 import pydantic
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -22,11 +23,15 @@ from jaxbiped.mission.settings import SIMULATED, MissionConfig
 from jaxbiped.report.reproduction.files import write
 from jaxbiped.report.reproduction.page import answer
 from jaxbiped.study import store
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.evaluate import evaluate
 from jaxbiped.study.reproduction import EXPERIMENTS, PUBLISHED, fit_measuring
 from jaxbiped.study.reproduction.findings import Findings
 from jaxbiped.study.reproduction.gather import MISSIONS, experiment, lintel, mishaps, shortest, strategies
+from jaxbiped.study.reproduction.saved import always, population, study
 from jaxbiped.study.reproduction.staging import load_scenes, seeing
 from jaxbiped.study.reproduction.table_1 import SCENES
+from jaxbiped.study.reproduction.table_2 import NAMES, verify_all
 
 
 class ReproduceArgs(Model):
@@ -44,6 +49,12 @@ class ReproduceArgs(Model):
     """What the missions of the scenes see with."""
     executor: Literal["native", "mjx", "sampled", "kinematic"] = "native"
     """How they move."""
+    draws: Annotated[int, pydantic.Field(ge=0, le=100_000)] = 32
+    """Trials of each primitive for Table 2; 0: none."""
+    population: Annotated[int, pydantic.Field(ge=0, le=1_000_000)] = 1000
+    """Random bumps, crossed and gone round, with executor `sampled` and sensor `raycast`; 0: none."""
+    walked: Annotated[int, pydantic.Field(ge=0, le=1_000_000)] = 100
+    """The same with executor `native`; 0: none."""
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/reproduce-<hash of these options>."""
 
@@ -94,28 +105,55 @@ def gather(args: ReproduceArgs, arenas: dict[str, Arena], config: MissionConfig,
             table_1 = strategies(arenas, config, args.seed, eyes, done)
     with stage(console, "what cannot work", of_mishaps) as done:
         endings = mishaps(args.sensor, args.seed, done)
+    table_2 = ()
+    if args.draws:
+        with stage(console, "Table 2", len(NAMES)) as done:
+            table_2 = verify_all(config.walk.biped, args.draws, args.seed, done)
+    studies = list(crossings(args, console))
     records, shown, logs = ({number: some[k] for number, some in played.items()} for k in range(3))
     fit = fit_measuring([each for some in records.values() for each in some], PUBLISHED, shown)
+    measure = fit.seconds if fit else config.durations.measure
     return Findings(
-        default=config.durations.measure,
+        config=config,
         experiments=records,
         shown=shown,
         logs=logs,
         shortest={item.number: shortest(arenas[item.scene], config, item.strategy) for item in EXPERIMENTS},
         gate_depth=max(lintel(arenas[item.scene]) for item in EXPERIMENTS),
-        radius=config.robot.radius,
         fit=fit,
         table_1=table_1,
+        table_2=table_2,
         endings=endings,
+        populations=tuple(population(frame, study, measure, other) for study, frame, other in studies),
     )
 
 
+def crossings(args: ReproduceArgs, console: Console) -> Iterator[tuple[StudyConfig, pl.DataFrame, pl.DataFrame | None]]:
+    """The rows of both populations; of the larger one also those of a robot that always crosses."""
+    if args.population:
+        config = study(args.population, args.seed, "sampled")
+        yield config, rows(config, "random bumps, sampled", console), rows(always(config), "always crossed", console)
+    if args.walked:
+        config = study(args.walked, args.seed, "native")
+        yield config, rows(config, "random bumps, native", console), None
+
+
+def rows(config: StudyConfig, name: str, console: Console) -> pl.DataFrame:
+    """All rows of a study, which is not stored."""
+    with stage(console, name, config.arenas * len(config.strategies)) as done:
+        return pl.concat([frame for _, frame in evaluate(config, lambda progress: done(progress.ended))])
+
+
 @contextmanager
-def stage(console: Console, name: str, total: int) -> Iterator[Callable[[], None]]:
-    """A part of the command: a bar on a terminal, and how long it took."""
+def stage(console: Console, name: str, total: int) -> Iterator[Callable[..., None]]:
+    """A part of the command: a bar on a terminal, and how long it took.
+
+    Yields:
+      To be called after each mission, or with the number of those that have ended.
+    """
     began = time.perf_counter()
     columns = TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task(name, total=total)
-        yield lambda: bar.advance(task)
+        yield lambda done=None: bar.advance(task) if done is None else bar.update(task, completed=done)
     console.print(f"{name}: {total} in {time.perf_counter() - began:.0f} s", highlight=False)

@@ -47,11 +47,23 @@ def save_voxels(
     lowest: int,
     title: str = "",
 ) -> None:
-    """A PNG of the 3D grid, voxels as blocks coloured by their height, x away from the viewer."""
+    """A PNG of `voxel_figure`."""
+    save_figure(voxel_figure(occupied, pitch, level_height, lowest, title), path)
+
+
+def voxel_figure(
+    occupied: Bool[np.ndarray, "H W Z"],
+    pitch: float,
+    level_height: float,
+    lowest: int,
+    title: str = "",
+    size: tuple[float, float] = (9.0, 6.5),
+) -> Figure:
+    """The 3D grid, voxels as blocks coloured by their height, x away from the viewer; `size` in inches."""
     while exposed_count(occupied) > MOST_FACES:
         occupied, pitch, level_height, lowest = halved(occupied), 2 * pitch, 2 * level_height, lowest // 2
     faces, heights, shades = block_faces(occupied, pitch, level_height, lowest)
-    figure = Figure(figsize=(9, 6.5), layout="constrained")
+    figure = Figure(figsize=size, layout="constrained")
     ax = figure.subplots()
     if len(faces):
         scale = Normalize(0, max(float(heights.max()), level_height))
@@ -70,7 +82,7 @@ def save_voxels(
     ax.set_title(title, fontsize=10)
     for spine in ax.spines.values():
         spine.set_visible(False)
-    save_figure(figure, path)
+    return figure
 
 
 def matplotlib_scale(scale: Normalize):

@@ -12,7 +12,9 @@ from typing import Any
 import polars as pl
 
 from jaxbiped.files import new_folder, write_whole
+from jaxbiped.mission.recording import FILE, save_log
 from jaxbiped.report.reproduction.page import PAGE, answer, build
+from jaxbiped.report.reproduction.population import COLUMNS
 from jaxbiped.study.reproduction.account import Record
 from jaxbiped.study.reproduction.findings import Findings
 from jaxbiped.study.reproduction.paper import EXPERIMENTS
@@ -35,7 +37,13 @@ def write(out: Path, found: Findings, args: dict[str, Any], facts: dict[str, str
         buffer = io.BytesIO()
         missions(found).write_parquet(buffer)
         write_whole(folder / MISSIONS, saver(buffer.getvalue()))
-    return [*texts, MISSIONS]
+        for each in found.populations:
+            each.both.write_parquet(folder / f"saved_{each.executor}.parquet")
+        for item in EXPERIMENTS:
+            (folder / item.scene).mkdir()
+            save_log(folder / item.scene / FILE, found.logs[item.number], {"scene": item.scene, "args": args})
+    others = [f"saved_{each.executor}.parquet" for each in found.populations]
+    return [*texts, MISSIONS, *others, f"{EXPERIMENTS[0].scene} to {EXPERIMENTS[-1].number}"]
 
 
 def saver(data: bytes) -> Callable[[Any], object]:
@@ -63,6 +71,16 @@ def figures(found: Findings) -> dict[str, Any]:
             for (strategy, scene), each in found.table_1.items()
         ],
         "table_2": [dataclasses.asdict(each) for each in found.table_2],
+        "populations": [
+            {
+                "executor": each.executor,
+                "arenas": each.arenas,
+                "solved_by_both": len(each.both),
+                "percentile": {name: each.percentile(*COLUMNS[name]) for name in COLUMNS},
+                "pair": dataclasses.asdict(each.pair),
+            }
+            for each in found.populations
+        ],
         "what_cannot_work": [
             {"name": each.mishap.name, "code": each.mission.code.label, "named": each.named} for each in found.endings
         ],

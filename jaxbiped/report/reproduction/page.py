@@ -7,8 +7,11 @@ from collections.abc import Mapping
 
 from jaxbiped.report.grid import to_grid, typeset
 from jaxbiped.report.page import Key, Page, Section, render
+from jaxbiped.report.reproduction.making import making_of
 from jaxbiped.report.reproduction.pictures import KEY, growing
+from jaxbiped.report.reproduction.population import population_section, saved_sheet
 from jaxbiped.report.reproduction.reasons import WORTH, distance_reason, relative, time_reason
+from jaxbiped.report.reproduction.robot import robot_plots
 from jaxbiped.report.reproduction.tables import (
     account_sheet,
     endings_sheet,
@@ -75,7 +78,7 @@ def answer(found: Findings) -> list[str]:
     near = [item.number for item in PUBLISHED if close(item, found)]
     said.append(
         f"Of the four with a published time, {len(near)} end within {100 * WORTH:.0f} % of it"
-        + (f" ({', '.join(f'experiment {n}' for n in near)})." if near else ".")
+        + (f" (experiments {' and '.join(map(str, near))})." if near else ".")
     )
     if found.fit:
         said.append(
@@ -97,7 +100,7 @@ def reasons(found: Findings) -> list[str]:
     for item in EXPERIMENTS:
         shown = found.shown[item.number]
         said.append(distance_reason(item, shown, found.shortest.get(item.number)))
-        said.append(time_reason(item, shown, found.measure, found.gate_depth, found.radius))
+        said.append(time_reason(item, shown, found.measure, found.gate_depth, found.config.robot.radius))
     return [text for text in said if text]
 
 
@@ -128,7 +131,9 @@ def sections(found: Findings) -> tuple[Section, ...]:
         made.append(Section("Table 1", grids=(to_grid(table_1_sheet(found)), to_grid(endings_sheet(found)))))
     if found.table_2:
         made.append(Section("Table 2", grids=(to_grid(table_2_sheet(found.table_2)),)))
+    made += populations(found)
     made += [experiment(item, found) for item in EXPERIMENTS]
+    made.append(making(found))
     if found.endings:
         made.append(Section("What cannot work", grids=(to_grid(mishap_sheet(found.endings)),)))
     return tuple(made)
@@ -136,6 +141,25 @@ def sections(found: Findings) -> tuple[Section, ...]:
 
 def experiment(item: Experiment, found: Findings) -> Section:
     """The pictures of one experiment."""
+    log = found.logs[item.number]
+    robots, why = robot_plots(item, log, found.config.walk.biped)
     text = (KEY,) if item is EXPERIMENTS[0] else ()
     title = f"Experiment {item.number}: {item.title} (Fig. {item.figure} of the paper)"
-    return Section(title, text, tuple(growing(found.logs[item.number])))
+    return Section(title, (*text, why) if why else text, (*growing(log), *robots))
+
+
+def making(found: Findings) -> Section:
+    """How the map of the last experiment was made, after its third measurement."""
+    item = EXPERIMENTS[-1]
+    log = found.logs[item.number]
+    t = min(2, max(len(log.time) - 2, 0))
+    plots = making_of(log, t, found.config.robot)
+    return Section(f"How a map is made: experiment {item.number} (Figs. 3 and 5 to 7 of the paper)", (), tuple(plots))
+
+
+def populations(found: Findings) -> list[Section]:
+    """The population behind the example of experiments 4 and 5."""
+    if not found.populations:
+        return []
+    summary = Section("The population behind the example", grids=(to_grid(saved_sheet(found.populations)),))
+    return [summary, *(population_section(each, found.measure) for each in found.populations)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from jaxbiped.physics.verify import trials
 from jaxbiped.study.intervals import Estimate, proportion
 from jaxbiped.study.reproduction.paper import TABLE_2
 
+NAMES = FIVE
 TITLES = {  # of our primitives: the paper's names, and its times [s]
     "straight": ("Straight-forward", TABLE_2.straight),
     "turn": ("Turn-direction", TABLE_2.turn),
@@ -86,4 +88,10 @@ def verify(name: str, robot: RobotModelConfig, draws: int, seed: int, pace: Pace
     )
 
 
-NAMES = FIVE
+def verify_all(robot: RobotModelConfig, draws: int, seed: int, done: Callable[[], None]) -> tuple[Verified, ...]:
+    """All five; `done` is called after each."""
+    found = []
+    for name in NAMES:
+        found.append(verify(name, robot, draws, seed))
+        done()
+    return tuple(found)
