@@ -54,7 +54,7 @@ def main(args: ViewArgs) -> int:
         print(f"playing arena {at[2]} again, {at[0]}; the first mission takes a minute to compile", flush=True)
     others = found if isinstance(found, Study) or len(found.choices(*at[:2])) > 1 else None
     with serving(found.open(*at), args.host, args.port, others, at) as page:
-        url = f"http://{args.host}:{page.server.get_port()}"
+        url = f"http://{reached_at(args.host)}:{page.server.get_port()}"
         print(f"{page.mission.title}: {page.mission.ending}")
         print(f"{url}  (Ctrl-C ends)", flush=True)
         if args.browser and not args.once:
@@ -62,6 +62,13 @@ def main(args: ViewArgs) -> int:
         if not args.once:
             wait()
     return 0
+
+
+def reached_at(host: str) -> str:
+    """The name in the URL of what listens to an address."""
+    if host in ("0.0.0.0", "::", ""):
+        return "localhost"
+    return f"[{host}]" if ":" in host else host
 
 
 def wait() -> None:

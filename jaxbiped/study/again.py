@@ -98,7 +98,11 @@ def play_again(
         play = partial(walk_logged, config=config.walk)
     settings, eyes = config.settings(strategy), eyes_for(config)
     each = [jax.tree.map(lambda leaf, k=k: leaf[k], batch) for k in range(len(arenas))]
-    return [play(arena, settings, seed, static, eyes=eyes) for arena, seed in zip(each, seeds, strict=True)]
+    try:
+        return [play(arena, settings, seed, static, eyes=eyes) for arena, seed in zip(each, seeds, strict=True)]
+    finally:
+        if eyes:
+            eyes.close()
 
 
 def mission_of(

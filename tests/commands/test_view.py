@@ -13,6 +13,7 @@ from jaxbiped.mission.recording import save_log
 from tests.report.test_viewer import seen
 from tests.study.test_sides import stored
 
+pytest.importorskip("viser")
 ONCE = ("--once", "--port", "0")
 
 
@@ -34,7 +35,6 @@ def refused(capsys, *argv):
 
 
 def test_it_serves_while_it_waits(result, capsys, monkeypatch):
-    pytest.importorskip("viser")
     asked = []
 
     def look():
@@ -51,11 +51,17 @@ def test_it_serves_while_it_waits(result, capsys, monkeypatch):
 
 
 def test_it_says_what_it_shows_and_where(result, capsys):
-    pytest.importorskip("viser")
     assert cli.main(("view", str(result), *ONCE)) == 0
     printed = capsys.readouterr().out.splitlines()
     assert printed[0] == "a_scene, full: reached: 104 s (1.7 min)"
     assert re.fullmatch(r"http://127\.0\.0\.1:\d+  \(Ctrl-C ends\)", printed[1]) and len(printed) == 2
+
+
+@pytest.mark.parametrize(
+    ("host", "name"), [("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "localhost"), ("::1", "[::1]"), ("::", "localhost")]
+)
+def test_the_name_in_the_url(host, name):
+    assert view.reached_at(host) == name
 
 
 def damage(folder, how):

@@ -51,11 +51,12 @@ def tiles(log: MissionLog, t: int) -> Bricks:
 
 
 def voxels(log: MissionLog, t: int) -> Bricks:
-    """The occupied voxels of the 3D grid, coloured by height; none where the log has none."""
+    """The occupied voxels of the 3D grid above the base floor, coloured by height; none where the log has none."""
     size = (VOXEL * log.pitch, VOXEL * log.pitch, VOXEL * log.level_height)
     if log.voxels is None:
         return Bricks(size, np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
-    rows, columns, levels = np.nonzero(log.voxels[t])
+    rows, columns, levels = np.nonzero(log.voxels[t, ..., 1:])
+    levels = levels + 1  # those of level 0 would cover the class map
     z = levels * log.level_height
     return Bricks(size, np.column_stack([centres(log, rows, columns), z]), height_colours(z))
 
