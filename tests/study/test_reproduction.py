@@ -11,7 +11,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.stepped import Mission, Played
 from jaxbiped.motion.primitives import DurationConfig
 from jaxbiped.study.reproduction import EXPERIMENTS, PUBLISHED, SAVED, TABLE_1, expected, fit_measuring, typical
-from jaxbiped.study.reproduction.account import KINDS, Part, Record, parts, record, walked
+from jaxbiped.study.reproduction.account import KINDS, Part, Record, other_reading, parts, record, walked
 from jaxbiped.study.reproduction.staging import load_scenes
 from jaxbiped.study.reproduction.table_1 import SCENES, right
 
@@ -97,6 +97,15 @@ def test_fit_of_nothing_and_of_too_slow_missions():
     assert fit_measuring([a_record(3, 1.0, 1, Code.FELL)], PUBLISHED, {}) is None
     slow = a_record(6, 1e4, 20)
     assert fit_measuring([slow], PUBLISHED, {6: slow}).seconds == 0.0
+
+
+def test_other_reading_of_the_gate_takes_a_third_of_its_time():
+    gate = Part(6, 0.30, 288.0)
+    changed = other_reading(
+        Record(6, "full", 0, Code.REACHED, 1.0, 500.0, 20, dict.fromkeys(KINDS, Part()) | {"gate": gate})
+    )
+    assert changed.moving == pytest.approx(500 - 192) and changed.parts["gate"] == Part(6, 0.30, pytest.approx(96.0))
+    assert other_reading(a_record(5, 500.0, 20)).moving == 500.0
 
 
 def test_typical_is_the_median_of_those_that_arrived():

@@ -19,6 +19,7 @@ from jaxbiped.report.plots import WIDTH, Plot
 from jaxbiped.report.reproduction.pictures import map_figure
 
 MOST_POINTS = 12_000  # drawn
+INK_AREA = 15_000.0  # [points2] of all their marks
 HEIGHT = 3.6  # [inch]
 
 
@@ -64,7 +65,8 @@ def points_figure(points: Float32[np.ndarray, "N 3"]) -> Figure:
     drawn = points[:: max(1, len(points) // MOST_POINTS)]
     flat = drawn @ screen().T.astype(np.float32)
     height = np.clip(drawn[:, 2], 0, None)
-    ax.scatter(*flat.T, c=height, s=1.2, lw=0, cmap=colormaps["viridis"], rasterized=True)
+    size = float(np.clip(INK_AREA / max(len(drawn), 1), 1.2, 8.0))
+    ax.scatter(*flat.T, c=height, s=size, lw=0, cmap=colormaps["viridis"], rasterized=True)
     ax.set(aspect="equal", xticks=[], yticks=[])
     ax.axis("off")
     return figure

@@ -24,7 +24,7 @@ STEPS = {
     "Stepping down": NAMES[Primitive.STEP_DOWN_BUMP],
 }
 QUALITY = 85  # of JPEG
-ABREAST = 90.0  # [deg] a camera beside the robot
+ABREAST = -90.0  # [deg] a camera on the robot's left
 
 
 def robot_plots(item: Experiment, log: MissionLog, robot: RobotModelConfig) -> tuple[list[Plot], str]:
@@ -32,6 +32,8 @@ def robot_plots(item: Experiment, log: MissionLog, robot: RobotModelConfig) -> t
     if log.walk is None:
         return [], "The robot was not simulated, so that there is no picture of it."
     wanted = moments(item, log)
+    if not wanted:
+        return [], ""
     try:
         shots = photographs(log, robot, list(wanted.values()), through=item.gate, side=ABREAST if item.edges else 125.0)
     except InputError as error:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def experiment_sheet(found: Findings, table: int | None) -> Sheet:
         None: "Experiments 1 and 2, of which the paper gives no figures",
     }[table]
     rows = tuple(experiment_row(item, found) for item in EXPERIMENTS if item.table == table)
-    columns = ("experiment", "reached", "distance\ncm", "paper\ncm", "%", "time\nmin", "paper\nmin", "%")
+    columns = ("experiment", "reached", "distance\ncm", "paper's\ncm", "off\n%", "time\nmin", "paper's\nmin", "off\n%")
     columns += (f"at {found.default:g} s\nmin",)
     count = max(len(records) for records in found.experiments.values())
     notes = (
@@ -92,13 +92,18 @@ def experiment_sheet(found: Findings, table: int | None) -> Sheet:
     return Sheet(title, columns, (rows,), notes)
 
 
-def fit_sheet(fit: Measuring, found: Findings) -> Sheet:
-    """The one free number, and what it leaves."""
+def fit_sheet(fit: Measuring, records: Mapping[int, Record], title: str = "") -> Sheet:
+    """The one free number, and what it leaves.
+
+    Args:
+      records: of each experiment the one that is shown.
+      title: put before the fitted number.
+    """
     rows = []
     for item in EXPERIMENTS:
         if item.number not in fit.residuals:
             continue
-        shown, left = found.shown[item.number], fit.residuals[item.number]
+        shown, left = records[item.number], fit.residuals[item.number]
         rows.append((
             f"{item.number}, {item.title}",
             number(shown.moving / 60, 1),
@@ -112,7 +117,7 @@ def fit_sheet(fit: Measuring, found: Findings) -> Sheet:
     columns = ("experiment", "moving\nmin", "measurements", "time\nmin", "paper\nmin", "off\nmin", "%", "alone\ns")
     rms = np.sqrt(np.mean(np.square(list(fit.residuals.values())))) if fit.residuals else 0.0
     return Sheet(
-        f"A measurement takes {fit.seconds:.1f} s",
+        f"{title or 'A'} measurement takes {fit.seconds:.1f} s",
         columns,
         (tuple(rows),),
         (
@@ -148,9 +153,10 @@ def table_1_sheet(found: Findings) -> Sheet:
     for name, (works, said) in TABLE_1.items():
         ours = [found.table_1[name, scene] for scene in SCENES]
         cells = [f"{'O' if each.passed else 'X'} ({'M' if each.measured else 'U'})" for each in ours]
-        rows.append((name, works, *(f"{a} / {b}" for a, b in zip(cells, (*said, NONE), strict=True))))
+        both = [f"{a} / {b}" for a, b in zip(cells, said, strict=False)]
+        rows.append((name, works, *both, *cells[len(said) :]))
     names = [scene.removeprefix("table_1_") for scene in SCENES]
-    columns = ("strategy", "stands for", *(f"{name}\nours / paper" for name in names))
+    columns = ("strategy", "stands for", *(f"{name}\nours / paper's" for name in names[:-1]), f"{names[-1]}\nours")
     return Sheet(
         "Table 1: what each strategy passes and measures",
         columns,
