@@ -38,7 +38,7 @@ class StereoArgs(ChartArgs):
     right: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RIGHT")]
     """That of the right camera."""
     camera: Annotated[Path, tyro.conf.arg(metavar="FILE")]
-    """Calibration: .toml, OpenCV's .yaml or .xml, or Middlebury's calib.txt."""
+    """Calibration: .toml, .yaml of OpenCV or of ROS (left.yaml beside right.yaml), .xml, or Middlebury's calib.txt."""
     max_range: Annotated[float | None, Field(gt=0, le=1000), tyro.conf.arg(metavar="FLOAT")] = None
     """[m] Drop what is further off. Default: where depth is as uncertain as at 2 m in the paper's camera."""
     num_disparities: Annotated[int | None, Field(ge=16, le=2048, multiple_of=16), tyro.conf.arg(metavar="INT")] = None

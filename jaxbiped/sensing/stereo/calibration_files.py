@@ -1,4 +1,4 @@
-"""Calibration files: our TOML, the robot's camera file, OpenCV's YAML or XML, and Middlebury's calib.txt."""
+"""Calibration files: our TOML, the robot's camera file, YAML or XML of OpenCV, YAML of ROS, Middlebury's calib.txt."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from jaxbiped.files import reason
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.sensing.stereo.calibration import PoseConfig, RawConfig, RectifiedConfig, ideal
 from jaxbiped.sensing.stereo.rectify import Rig, make_rig
+from jaxbiped.sensing.stereo.ros_camera import is_ros, read_ros
 
 OPENCV = (".yaml", ".yml", ".xml")
 SUFFIXES = (".toml", *OPENCV, ".txt")
@@ -34,7 +35,7 @@ def load_rig(path: str | Path, shape: tuple[int, int]) -> Rig:
 
     Args:
       path: .toml (`RectifiedConfig`, `RawConfig`, or the robot's own `CameraConfig`), .yaml, .yml or .xml of OpenCV's
-        FileStorage, or a Middlebury calib.txt.
+        FileStorage, .yaml or .yml of ROS (one camera's, beside the other's), or a Middlebury calib.txt.
       shape: [px] width and height of the pictures, where the file does not say.
 
     Raises:
@@ -48,7 +49,10 @@ def load_rig(path: str | Path, shape: tuple[int, int]) -> Rig:
         raise InputError(f"must be one of {', '.join(SUFFIXES)}", file=path, field="camera", value=path.suffix)
     if suffix == ".toml":
         return read_toml(path)
-    data = read_opencv(path, shape) if suffix in OPENCV else read_middlebury(path, shape)
+    if suffix not in OPENCV:
+        data = read_middlebury(path, shape)
+    else:
+        data = read_ros(path) if suffix != ".xml" and is_ros(path) else read_opencv(path, shape)
     return make_rig(parse(RawConfig if "left" in data else RectifiedConfig, data, file=path))
 
 
