@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int8, UInt8
 
+SHORTEST = 1e-3  # [m] a shorter way is none, as in `arenas.movers`
 KINDS = ("obstacle", "bump", "gate")  # of an outline
 MARKS = ("circle", "square")  # of a landmark
 
@@ -19,6 +21,18 @@ class Outline:
     kind: str  # one of KINDS
     bottom: float = 0.0  # [m] height of its underside
     top: float = 0.0  # [m] height of its top
+    way: tuple[float, float, float, float] | None = (
+        None  # of one that moves: (dx, dy) [m], [m/s], phase: `arenas.movers`
+    )
+
+    def moved(self, time: float) -> tuple[float, float]:
+        """How far (x, y) [m] it is from its corners at a time [s] of the mission."""
+        if self.way is None:
+            return 0.0, 0.0
+        dx, dy, speed, phase = self.way
+        length = math.hypot(dx, dy)
+        part = 1.0 - abs((phase + (speed * time / length if length > SHORTEST else 0.0)) % 2.0 - 1.0)
+        return part * dx, part * dy
 
 
 @dataclass(frozen=True)

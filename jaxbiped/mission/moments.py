@@ -130,8 +130,14 @@ def outlines(arena: Arena) -> tuple[Outline, ...]:
         local = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [boxes.half_x[m], boxes.half_y[m]]
         corners = local @ np.array([[cos, sin], [-sin, cos]]) + [boxes.x[m], boxes.y[m]]
         kind = "gate" if boxes.overhead[m] else "bump" if boxes.top[m] <= 0.0601 else "obstacle"
-        found.append(Outline(corners, kind, float(boxes.bottom[m]), float(boxes.top[m])))
+        found.append(Outline(corners, kind, float(boxes.bottom[m]), float(boxes.top[m]), way_of(arena, m)))
     return tuple(found)
+
+
+def way_of(arena: Arena, m: int | np.integer) -> tuple[float, float, float, float] | None:
+    """How one box moves; None where all of the arena stand."""
+    movers = arena.movers
+    return movers and tuple(float(value[m]) for value in (movers.dx, movers.dy, movers.speed, movers.phase))
 
 
 def marks(arena: Arena) -> tuple[Mark, ...]:

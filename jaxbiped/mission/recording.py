@@ -99,7 +99,10 @@ def to_log(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> MissionLog:
         shape = tuple(int(n) for n in arrays["voxels_shape"])
         voxels = np.unpackbits(arrays["voxels"], count=int(np.prod(shape))).astype(bool).reshape(shape)
     walk = Walk(arrays["walk_qpos"], arrays["walk_moment"]) if "walk_qpos" in arrays else None
-    outlines = [Outline(**each | {"corners_xy": np.array(each["corners_xy"])}) for each in header["outlines"]]
+    outlines = [
+        Outline(**each | {"corners_xy": np.array(each["corners_xy"]), "way": each["way"] and tuple(each["way"])})
+        for each in header["outlines"]
+    ]
     return MissionLog(
         **{name: arrays[name] for name in WHOLE},
         **{name: arrays.get(name) for name in OPTIONAL},

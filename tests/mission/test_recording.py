@@ -21,8 +21,10 @@ def whole(moments=4):
     """A log with everything in it: clouds of different sizes, one of them empty."""
     ramp = np.tile(np.linspace(20, 230, 48, dtype=np.uint8)[None, :, None], (32, 1, 3))
     disparity = np.where(RNG.random((32, 48)) < 0.3, 0, np.float32(RNG.integers(0, 2560, (32, 48)) / 16))
+    first, *others = mission(moments).outlines
     return replace(
         mission(moments),
+        outlines=(replace(first, top=0.03, way=(0.3, -0.1, 0.02, 0.5)), *others),
         true_z=np.linspace(0, 0.03, moments),
         squat=np.arange(moments) % 2 == 1,
         points=tuple(RNG.uniform(-1, 2, (n, 3)).astype(np.float32) for n in (7, 0, 300, 1)[:moments]),

@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
+from jaxbiped.arenas.movers import Movers, boxes_at
+from jaxbiped.arenas.scene import BoxConfig, SceneConfig, to_arena
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import Walk
+from jaxbiped.mission.moments import outlines
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.report.pictures import COLOURS
@@ -36,14 +39,13 @@ def seen(moments=5):
     """A log of a simulated biped with points and voxels."""
     log = mission(moments)
     heights = ((0.0, 0.03), (0.37, 0.5), (0.0, 0.2))
-    outlines = tuple(
-        replace(each, bottom=low, top=high) for each, (low, high) in zip(log.outlines, heights, strict=True)
-    )
+    boxes = [replace(each, bottom=low, top=high) for each, (low, high) in zip(log.outlines, heights, strict=True)]
+    boxes[2] = replace(boxes[2], way=(0.0, 0.2, 0.02, 0.0))
     when = np.arange(0, moments - 1, 0.25, np.float32)
     states = [state(np.interp(m, np.arange(moments), log.true_xyyaw[:, 0]), 0.2 * m) for m in when]
     return replace(
         log,
-        outlines=outlines,
+        outlines=tuple(boxes),
         true_z=np.zeros(moments),
         squat=np.zeros(moments, bool),
         points=tuple(RNG.uniform(0, 0.3, (n, 3)).astype(np.float32) for n in (40, 30, 20, 10, 10)[:moments]),
@@ -118,6 +120,22 @@ def test_boxes_stand_where_they_do():
         outward = np.einsum("fi,fi->f", np.cross(b - a, c - a), (a + b + c) / 3 - box.vertices.mean(axis=0))
         assert np.all(outward > 0)
     assert found["arena/floor"].vertices[:, 2].max() <= 0
+
+
+def test_boxes_that_move_are_where_the_arena_has_them():
+    scene = SceneConfig(
+        name="small", size=(0.9, 0.6), start=(0.2, 0.3, 0.0), goal=(0.7, 0.3),
+        boxes=(BoxConfig(centre=(0.5, 0.4), size=(0.1, 0.2), top=0.2),),
+    )  # fmt: skip
+    still = to_arena(scene)
+    ways = (np.full(still.boxes.x.shape, value, np.float32) for value in (0.3, -0.1, 0.013, 0.4))
+    arena = replace(still, movers=Movers(*ways))
+    (outline,) = outlines(arena)
+    assert outline.bottom == 0 and outline.top == pytest.approx(0.2)
+    for time in (0.0, 7.0, 30.0, 100.0):
+        there = boxes_at(arena, time)
+        moved = np.add(outline.corners_xy.mean(axis=0), outline.moved(time))
+        np.testing.assert_allclose(moved, [there.x[0], there.y[0]], atol=1e-6)
 
 
 def test_a_simulated_biped_moves_as_it_did(puppet):
@@ -251,10 +269,11 @@ def test_the_server_gives_page_and_scene(page):
 def test_time_moves_the_robot_and_its_map(page):
     page.seek(0.0)
     torso, tiles = page.server.scene.get_handle_by_name("/robot/torso"), []
-    places = []
+    places, box = [], page.server.scene.get_handle_by_name("/arena/box_2")
     for time in (0.0, 60.0, 104.0):
         page.seek(time)
         places.append(torso.position[0])
+        assert tuple(box.position[:2]) == pytest.approx((0.0, 0.2 * (1 - abs((0.1 * time) % 2 - 1))))
         tiles.append(np.sum(page.server.scene.get_handle_by_name("/map").batched_positions[:, 2] > 0))
         assert f"**{time:.0f} s** of 104 s" in page.said.content and page.slider.value == time
         doing = {0.0: "Straight-forward", 104.0: "Straight-forward (reached)"}.get(time, "Straight-forward")

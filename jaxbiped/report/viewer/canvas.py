@@ -101,8 +101,11 @@ class Canvas:
             "/belief", vertices, faces, color=rgb(BELIEF), side="double", cast_shadow=False
         )
 
-    def pose(self, puppet: Puppet, qpos: Float[np.ndarray, "19"], looks_down: bool) -> None:
-        """Put the robot where it is."""
+    def pose(self, puppet: Puppet, qpos: Float[np.ndarray, "19"], looks_down: bool, time: float) -> None:
+        """Put the robot where it is, and boxes that move where they are at a time [s]."""
+        for outline, handle in zip(self.mission.log.outlines, self.boxes, strict=True):
+            if outline.way:
+                handle.position = (*outline.moved(time), 0.0)
         bodies, eye = puppet.poses(qpos)
         for k, handle in enumerate(self.bodies):
             handle.position, handle.wxyz = bodies.position[k], bodies.wxyz[k]

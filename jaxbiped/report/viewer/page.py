@@ -147,7 +147,7 @@ class Page:
                 if log.pictures:
                     self.left.image = log.pictures[t].left
                     self.disparity.image = disparity_image(log.pictures[t], self.nearest)
-            self.canvas.pose(self.puppet, self.motion.at(self.time), log.action[t] == LOOKED_DOWN)
+            self.canvas.pose(self.puppet, self.motion.at(self.time), log.action[t] == LOOKED_DOWN, self.time)
             said = status(log, t, self.time, float(self.ends[min(t, len(self.ends) - 1)]))
             if said != self.said.content:
                 self.said.content = said
