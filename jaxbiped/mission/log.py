@@ -21,9 +21,7 @@ class Outline:
     kind: str  # one of KINDS
     bottom: float = 0.0  # [m] height of its underside
     top: float = 0.0  # [m] height of its top
-    way: tuple[float, float, float, float] | None = (
-        None  # of one that moves: (dx, dy) [m], [m/s], phase: `arenas.movers`
-    )
+    way: tuple[float, float, float, float] | None = None  # if it moves: dx, dy, speed, phase of `arenas.movers`
 
     def moved(self, time: float) -> tuple[float, float]:
         """How far (x, y) [m] it is from its corners at a time [s] of the mission."""
