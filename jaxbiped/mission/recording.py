@@ -100,7 +100,7 @@ def to_log(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> MissionLog:
         voxels = np.unpackbits(arrays["voxels"], count=int(np.prod(shape))).astype(bool).reshape(shape)
     walk = Walk(arrays["walk_qpos"], arrays["walk_moment"]) if "walk_qpos" in arrays else None
     outlines = [
-        Outline(**each | {"corners_xy": np.array(each["corners_xy"]), "way": each["way"] and tuple(each["way"])})
+        Outline(**each | {"corners_xy": np.array(each["corners_xy"]), "way": tuple(each.get("way") or ()) or None})
         for each in header["outlines"]
     ]
     return MissionLog(
