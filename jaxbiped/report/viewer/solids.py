@@ -18,6 +18,7 @@ from jaxbiped.report.pictures import GOAL_RADIUS, INK
 Colour = tuple[int, int, int]
 
 FLOOR_DEPTH, RIM = 0.012, 0.015  # [m] of the floor's slab, and how far it reaches beyond the arena
+BELOW = 0.0015  # [m] that it lies lower, for what lies on it not to flicker
 MARK_HEIGHT, RING_HEIGHT = 0.0045, 0.006  # [m]: above the tiles of the map
 RING_WIDTH, DASHES, SEGMENTS = 0.008, 16, 64
 FLOOR_COLOUR, MARKS = (120, 124, 132), {"circle": (226, 58, 46), "square": (28, 92, 230)}
@@ -61,7 +62,7 @@ def floor(log: MissionLog) -> Solid:
     """A slab under the arena."""
     width, depth = (float(side) for side in log.size_xy)
     mesh = trimesh.creation.box((width + 2 * RIM, depth + 2 * RIM, FLOOR_DEPTH))
-    mesh.apply_translation((width / 2, depth / 2, -FLOOR_DEPTH / 2))
+    mesh.apply_translation((width / 2, depth / 2, -FLOOR_DEPTH / 2 - BELOW))
     return solid("arena/floor", mesh, FLOOR_COLOUR)
 
 
