@@ -50,6 +50,8 @@ def refused(capsys, *argv: str) -> str:
         (["compare", "--strategies", "full", "full"], ["named once"]),
         (["compare", "--sensor", "lidar"], ["--sensor", "lidar", "raycast"]),
         (["compare", "--executor", "robot"], ["--executor", "robot", "kinematic"]),
+        (["compare", "--planner", "lattice"], ["--planner", "lattice", "heading"]),
+        (["run", SCENE, "--foot-placement", "perhaps"], ["--foot-placement", "perhaps", "False"]),
         (["compare", "--until-width", "0"], ["--until-width", "greater than 0"]),
         (["compare", "--until-width", "2"], ["until-width", "below 2 for success", "2.0"]),
         (["compare", "--until-width", "0.1", "--first", "brave"], ["--first", "brave"]),
@@ -124,7 +126,12 @@ def test_run_writes_its_folder(here, capsys):
     assert cli.main(["run", SCENE, "--out", "mine"]) == 0
     printed = capsys.readouterr().out
     assert "Step-up-bump" in printed and "reached" in printed
-    assert {path.name for path in (here / "mine").iterdir()} == {"map.png", "mission.gif", "mission.json", "mission.npz"}
+    assert {path.name for path in (here / "mine").iterdir()} == {
+        "map.png",
+        "mission.gif",
+        "mission.json",
+        "mission.npz",
+    }
     told = json.loads((here / "mine" / "mission.json").read_text())
     assert told["code"] == "reached" and f"{100 * told['distance']:.0f} cm" in printed
 
@@ -165,6 +172,14 @@ def test_presets_are_defaults_field_by_field(parsed):
     assert parsed("real.toml").stereo == real.model_copy(update={"sd": 0.5})
     assert parsed("real.toml", "--preset", "ideal").stereo == ideal.model_copy(update={"sd": 0.5})
     assert parsed("real.toml", "--preset", "ideal").landmarks == PRESETS["ideal"].landmarks
+
+
+def test_switches_past_the_paper(here, parsed):
+    assert parsed().planner == "cell" and parsed().foot_placement is None
+    mission = parsed("--planner", "heading", "--executor", "native", "--foot-placement", "False")
+    assert mission.planner == "heading" and mission.foot_placement is False
+    (here / "study.toml").write_text("[mission]\nplanner = 'heading'\nfoot_placement = true\n")
+    assert parsed("study.toml").foot_placement is True
 
 
 @pytest.mark.parametrize("command", sorted(cli.COMMANDS))

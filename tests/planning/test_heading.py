@@ -253,3 +253,10 @@ def test_faces_are_the_same_on_any_device(maps, pitch):
     np.testing.assert_array_equal(np.where(ours == own, own, dense), ours)
     over = np.asarray(planning.heading_field(*maps, pitch).moves.face) != own
     np.testing.assert_array_equal(np.asarray(dense)[over], np.asarray(ours)[over])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_arenas(method):
+    none = np.zeros((0, 4, 5), np.int8)
+    field = planning.heading_field(none, none, goal_ij=np.zeros((0, 2), int), method=method)
+    assert field.cost.shape == (0, 8, 4, 5) and field.converged.shape == (0,)

@@ -114,7 +114,7 @@ def wavefront(
 
     def body(state):
         cost, _, step = state
-        after = cost.reshape(batch, -1)[:, to]
+        after = cost.reshape(batch, 8 * height * width)[:, to]
         new = jnp.minimum(cost, (after + taken).min(2))
         for eighths in (1, 2, 1):  # which together reach all that is up to 180 degrees off
             for way in (eighths, -eighths):
