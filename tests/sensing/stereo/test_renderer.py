@@ -1,5 +1,8 @@
 """Rendered pairs against a plain ray cast, and what rendering needs."""
 
+import os
+import subprocess
+import sys
 import threading
 from dataclasses import replace
 
@@ -125,3 +128,39 @@ def test_no_opengl_is_one_line_that_names_the_package(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "osmesa")
     with pytest.raises(InputError, match="apt install libosmesa6"):
         rendering.Renderer(CAMERA)
+
+
+DRAW = """
+import sys, numpy as np
+from jaxbiped.arenas import load_scene
+from jaxbiped.errors import InputError
+from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.stereo.renderer import Renderer
+try:
+    eye = Renderer(CameraConfig())
+except InputError:
+    sys.exit(7)
+eye.show(load_scene(sys.argv[1])[1])
+pair = eye.pair(np.array([0.3, 0.7, 0.36]), np.array([[0, -0.5, 0.866], [-1, 0, 0], [0, -0.866, -0.5]]), 0.0, 1)
+np.savez(sys.argv[2], left=pair.left, right=pair.right, kind=type(eye.gl).__module__)
+eye.close()
+"""
+
+
+@pytest.mark.slow
+def test_osmesa_draws_what_egl_draws(request, tmp_path):
+    """In processes of their own, each asked for one of them. Drivers may round colours: within two grey levels."""
+    scene, drawn = request.config.rootpath / "configs" / "scenes" / "experiment_6.toml", {}
+    for name in ("egl", "osmesa"):
+        out = tmp_path / f"{name}.npz"
+        asked = [sys.executable, "-c", DRAW, str(scene), str(out)]
+        named = os.environ | {"MUJOCO_GL": name}
+        ended = subprocess.run(asked, env=named, cwd=request.config.rootpath, timeout=300, check=False)
+        if ended.returncode == 7:
+            pytest.skip(f"this machine has no {name}")
+        assert ended.returncode == 0
+        drawn[name] = np.load(out)
+        assert name in str(drawn[name]["kind"])
+    for side in ("left", "right"):
+        off = np.abs(drawn["egl"][side].astype(int) - drawn["osmesa"][side])
+        assert np.mean(off) < 0.5 and np.quantile(off, 0.99) <= 2
