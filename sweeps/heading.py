@@ -106,7 +106,7 @@ def bound(arenas: int, seed: int, strategy: str, console: Console) -> None:
     console.print(table)
     by_time, by_cost = taken[:, -2], taken[:, -1]
     both = np.isfinite(by_time + by_cost)
-    off, lost = (by_time - best)[both], (by_cost - by_time)[both]
+    off, lost = by_time[both] - best[both], by_cost[both] - by_time[both]
     mean, _ = mean_and_median(lost, seed=seed)
     console.print(
         f"Walked on these maps, with the paper's costs, decision by decision, at real yaws: {np.sum(both):,} arrive by "
