@@ -9,7 +9,9 @@ interval (Tango) and McNemar's p, and how far off the robot believes to stand wh
 
 from __future__ import annotations
 
+import contextlib
 import time
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -22,12 +24,13 @@ from rich.table import Table
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
-from jaxbiped.mission.eyes import eyes_for
+from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Result, stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.evaluate import draw, run_all, run_one_by_one
+from jaxbiped.study.evaluate import draw, run_all
+from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.paired import success_difference
 from jaxbiped.study.walks import walk_all
 
@@ -40,15 +43,14 @@ def play(config: MissionConfig, batch, seeds, count: int, strategy: str) -> Resu
     static = program(config, (SIZE_X, SIZE_Y))
     points, one = stack([config.settings(strategy)]), np.zeros(1, int)
     arguments = batch, seeds, points, count, static, lambda _: None
-    eyes = eyes_for(config)
+    see = partial(open_eyes, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
-        result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
-    elif eyes:
-        result = run_one_by_one(*arguments, eyes, population_of=one)
+        with see() if see else contextlib.nullcontext() as eyes:
+            result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
+    elif see:
+        result = run_on_host(*arguments, see, population_of=one)
     else:
         result = run_all(*arguments)
-    if eyes:
-        eyes.close()
     return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
 
 
