@@ -73,6 +73,16 @@ def test_loop_does_not_stand_in_for_a_sensor_on_the_host(first_look):
         jax.eval_shape(partial(cycle, program=static), *first_look)
 
 
+def test_rendered_stereo_has_a_rule_for_far_walls_of_its_own():
+    """What is given wins; other sensors keep the map of the published studies."""
+    parts = {"stereo": {}, "fewer": {"mapping": {"below_points": 20}}, "none": {"mapping": {"below_points": None}}}
+    found = {name: MissionConfig(sensor="stereo", **part).mapping.below_points for name, part in parts.items()}
+    assert found == {"stereo": 50, "fewer": 20, "none": None}
+    assert MissionConfig().mapping.below_points is None and MissionConfig().settings("full").mapping.below_points is None
+    cast = MissionConfig(sensor="stereo").model_copy(update={"sensor": "raycast"})  # as `fit-sensor` compares them
+    assert cast.settings("full").mapping.below_points == 50
+
+
 def test_jax_sensors_need_no_eyes():
     assert eyes_for(CONFIG) is None and eyes_for(MissionConfig(sensor="oracle")) is None
 
