@@ -1,10 +1,11 @@
 """Self-localisation with and without landmarks, on the same arenas with the same noise.
 
     python sweeps/localisation.py [--arenas N] [--executor kinematic|sampled|native] [--sensor raycast|stereo]
-        [--scenes] [--preset NAME]
+        [--scenes-only] [--ways landmarks visual ...] [--worse 5 10]
 
 Printed for each way of localisation: how many missions reach the goal, the paired difference to landmarks with its
-interval (Tango) and McNemar's p, and how far off the robot believes to stand when it gets there.
+interval (Tango) and McNemar's p, and how far off the robot believes to stand when it gets there. `--worse` repeats
+`visual` with so many times the errors that rendered pictures have (ray-cast sensor).
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Result, stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
+from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.evaluate import draw, run_all
 from jaxbiped.study.hosted import open_eyes, run_on_host
@@ -68,6 +70,7 @@ def main(
     sensor: Literal["raycast", "stereo"] = "raycast",
     ways: tuple[Literal[WAYS], ...] = WAYS,
     scenes_only: bool = False,
+    worse: tuple[float, ...] = (),
     preset: str = "rendered",
     seed: int = 0,
     strategy: str = "full",
@@ -80,20 +83,28 @@ def main(
     columns = "localisation", "reached", "less landmarks", "p", "off at the goal", "95 %", "of yaw", "95 %"
     table = Table(*columns, title=f"{what}, executor {executor}, sensor {sensor}, preset {preset}")
     reached = {}
-    for way in ways:
+    for way, times in [(way, 1.0) for way in ways] + [("visual", times) for times in worse]:
         begun = time.time()
-        config = MissionConfig(executor=executor, sensor=sensor, localisation=way, preset=preset)
+        visual = VisualConfig()
+        scaled = {name: times * getattr(visual, name) for name in ("forward", "left", "yaw")}
+        config = MissionConfig(
+            executor=executor,
+            sensor=sensor,
+            localisation=way,
+            preset=preset,
+            visual=visual.model_copy(update=scaled),
+        )
         result = play(config, batch, seeds, arenas, strategy)
         there = reached[way] = result.code == Code.REACHED
         difference = "", ""
-        if way != ways[0] == "landmarks":
+        if way != "landmarks" and "landmarks" in reached:
             found = success_difference(there, reached["landmarks"])
             interval = f"[{100 * found.low:+.1f}, {100 * found.high:+.1f}]"
             difference = f"{100 * found.estimate:+.1f} points {interval}", f"{found.p:.3f}"
         off, turned = (np.percentile(error[there], (50, 95)) if there.any() else np.full(2, np.nan)
                        for error in (result.pose_error, np.rad2deg(result.yaw_error)))  # fmt: skip
         row = (
-            way,
+            way if times == 1 else f"{way}, errors x {times:g}",
             f"{there.mean():.1%}",
             *difference,
             *(f"{100 * value:.2f} cm" for value in off),

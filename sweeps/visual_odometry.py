@@ -95,7 +95,8 @@ def trial(place: Place, pose: Pose, number: int, sensor: StereoSensor, config: M
         found.append(find_features(grey(pair.left), disparity.value, sensor.rig, at))
         seconds = time.process_time() - begun
     begun = time.process_time()
-    motion = find_motion(*found, sensor.rig)
+    nominal = np.array([command.length * np.cos(command.turn), command.length * np.sin(command.turn), command.turn])
+    motion = find_motion(*found, sensor.rig, nominal)
     seconds += time.process_time() - begun
     error = np.array([motion.x, motion.y, motion.yaw], float) - true
     claimed = float(error @ np.linalg.solve(motion.cov.astype(float), error)) if motion.seen else np.nan

@@ -85,7 +85,7 @@ class StereoEyes:
         arena, spread = jax.device_get((arena, settings.landmarks))
         if not self.marked:
             arena = replace(arena, landmarks=replace(arena.landmarks, used=np.zeros_like(arena.landmarks.used)))
-        names = jax.device_get(view_names(world, mind)) if self.tracker else None
+        names, moved = jax.device_get((view_names(world, mind), mind.anchor.moved)) if self.tracker else (None, None)
         seen = []
         for k in range(count or len(world.code)):
             one, spread_one, (eye, believed, max_range) = jax.tree.map(lambda v, k=k: v[k], (arena, spread, placing))
@@ -94,7 +94,7 @@ class StereoEyes:
             sightings = self.last.sightings
             if self.tracker:
                 now, then = (self.sensor.shown + row[k].tobytes() for row in names)
-                sightings = replace(sightings, motion=self.tracker(self.last, at, now, then))
+                sightings = replace(sightings, motion=self.tracker(self.last, at, now, then, moved[k].astype(float)))
             seen.append((self.last.view, sightings))
         seen += seen[-1:] * (len(world.code) - len(seen))
         return jax.tree.map(lambda *rows: np.stack(rows), *seen)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Float32, Int, UInt8
+from jaxtyping import Bool, Float, Float32, Int, UInt8
 
 from jaxbiped.sensing.camera import Mount
 from jaxbiped.sensing.shot import Shot
@@ -27,6 +27,8 @@ RATIO = 0.8  # of the distances of the best and the second best match (Lowe, 200
 HYPOTHESES = 200  # motions that are tried
 SPREAD = np.array([0.6, 0.6, 0.3])  # [px] standard deviations of a match in column, row and disparity
 FAR = 16.3  # squared distance in these beyond which a match is wrong: one good one in 1,000 is
+TILT, CLIMB = np.deg2rad(6.0), 0.06  # [rad, m] by which a robot may tilt, and rise or sink, from view to view
+ASTRAY, TURNED = 0.05, 0.15  # [m, rad] by which dead reckoning may be off
 LEAST = 12  # matches that must agree on a motion
 ROUNDS = 8  # of least squares
 KEPT = 256  # views: of more robots than walk at once
@@ -75,14 +77,18 @@ def to_robot(seen, camera: StereoCamera, R, origin) -> Float[np.ndarray, "n 3"]:
     return np.column_stack([x, y, depth]) @ R.T + origin
 
 
-def find_motion(before: Features, after: Features, camera: StereoCamera, seed: int = 0) -> Motion:
+def find_motion(
+    before: Features, after: Features, camera: StereoCamera, expected: Float[np.ndarray, "3"], seed: int = 0
+) -> Motion:
     """The robot's motion from one measurement to the next; `seen` is off where too few matches agree on one.
 
-    `seed` is that of the motions that are tried.
+    Args:
+      expected: (x, y, yaw) [m, m, rad] by dead reckoning: a floor that looks the same in two places leads astray.
+      seed: of the motions that are tried.
     """
     a, b = matches(after.descriptors, before.descriptors)
     points, goal = after.points[a], before.seen[b]
-    guess = propose(points, before.points[b], goal, before, camera, np.random.default_rng(seed))
+    guess = propose(points, before.points[b], goal, before, camera, expected, np.random.default_rng(seed))
     if guess is None:
         return no_motion()
     R, t = guess
@@ -100,7 +106,7 @@ def find_motion(before: Features, after: Features, camera: StereoCamera, seed: i
     cov = INFLATION * spread * np.linalg.inv(H)
     kept = [0, 1, 5]
     moved = np.array([t[0], t[1], np.arctan2(R[1, 0], R[0, 0])])
-    if not (np.isfinite(moved).all() and np.isfinite(cov).all()):
+    if not (np.isfinite(moved).all() and np.isfinite(cov).all() and possible(R, t, expected)):
         return no_motion()
     return Motion(*moved.astype(np.float32), cov[np.ix_(kept, kept)].astype(np.float32), np.bool_(True))
 
@@ -112,14 +118,14 @@ class Tracker:
         self.camera = camera
         self.kept: OrderedDict[bytes, Features] = OrderedDict()
 
-    def __call__(self, shot: Shot, at: Mount, now: bytes, then: bytes) -> Motion:
-        """The motion from view `then`, if it is kept, to this one, which is kept as `now`."""
+    def __call__(self, shot: Shot, at: Mount, now: bytes, then: bytes, expected: Float[np.ndarray, "3"]) -> Motion:
+        """The motion from view `then`, if it is kept, to this one, which is kept as `now`; see `find_motion`."""
         found = find_features(grey(shot.left), shot.disparity, self.camera, at)
         before = self.kept.get(then)
         self.kept[now] = found
         while len(self.kept) > KEPT:
             self.kept.popitem(last=False)
-        return no_motion() if before is None else find_motion(before, found, self.camera)
+        return no_motion() if before is None else find_motion(before, found, self.camera, expected)
 
 
 def no_motion() -> Motion:
@@ -141,7 +147,7 @@ def matches(
     return tuple(np.array(pairs, int).T) if pairs else (none, none)
 
 
-def propose(points, goal_points, goal, before: Features, camera: StereoCamera, rng: np.random.Generator):
+def propose(points, goal_points, goal, before: Features, camera: StereoCamera, expected, rng: np.random.Generator):
     """The motion (R, t) through three matches that most matches agree with; None where too few do."""
     if len(points) < LEAST:
         return None
@@ -149,11 +155,20 @@ def propose(points, goal_points, goal, before: Features, camera: StereoCamera, r
     R, t = rigid(points[three], goal_points[three])
     moved = np.einsum("kij,nj->kni", R, points) + t[:, None]
     agree = np.sum(((project(moved, before, camera) - goal) / SPREAD) ** 2, axis=2) < FAR
+    agree &= possible(R, t, expected)[:, None]
     best = int(np.argmax(agree.sum(1)))
     if agree[best].sum() < LEAST:
         return None
     R, t = rigid(points[agree[best]][None], goal_points[agree[best]][None])
     return R[0], t[0]
+
+
+def possible(R: Float[np.ndarray, "*k 3 3"], t: Float[np.ndarray, "*k 3"], expected) -> Bool[np.ndarray, "*k"]:
+    """Whether a robot can have moved so: it tilts little, climbs a step at most, and is about where it expects."""
+    turned = np.arctan2(R[..., 1, 0], R[..., 0, 0]) - expected[2]
+    near = np.hypot(t[..., 0] - expected[0], t[..., 1] - expected[1]) < ASTRAY
+    near &= np.abs(np.angle(np.exp(1j * turned))) < TURNED
+    return np.asarray(near & (R[..., 2, 2] > np.cos(TILT)) & (np.abs(t[..., 2]) < CLIMB))
 
 
 def rigid(points: Float[np.ndarray, "k n 3"], goal: Float[np.ndarray, "k n 3"]):

@@ -17,6 +17,7 @@ from jaxbiped.sensing.stereo.measure import StereoSensor
 CAMERA = CameraConfig()
 RIG = ideal(CAMERA)
 AT = jax.device_get(mount(CAMERA.traced()))
+MOTION = np.array([0.05, -0.02, 0.5])
 
 
 EMPTY = tracking.find_features(np.zeros((384, 512), np.uint8), np.zeros((384, 512), np.float32), RIG, AT)
@@ -48,7 +49,7 @@ def told(motion):
 
 @pytest.mark.parametrize("motion", [(0.05, 0.0, 0.0), (0.03, 0.04, np.pi / 4), (0.0, 0.0, -np.pi / 2)])
 def test_exact_points_give_the_exact_motion(motion):
-    found = tracking.find_motion(*scene(motion=motion), RIG)
+    found = tracking.find_motion(*scene(motion=motion), RIG, np.array(motion))
     assert found.seen
     np.testing.assert_allclose(told(found), motion, atol=3e-4)  # tilting turns the heading in second order
 
@@ -58,7 +59,7 @@ def test_errors_are_as_large_as_claimed():
     inflation; less, since a robust weight takes some of each good match away."""
     nees = []
     for seed in range(60):
-        found = tracking.find_motion(*scene(seed, noise=1 / np.sqrt(2), tilt=0.005), RIG)
+        found = tracking.find_motion(*scene(seed, noise=1 / np.sqrt(2), tilt=0.005), RIG, MOTION)
         error = told(found) - [0.05, -0.02, 0.5]
         nees.append(error @ np.linalg.solve(found.cov.astype(float), error) * tracking.INFLATION)
     assert 1.2 < np.mean(nees) < 4.3  # four standard errors
@@ -70,7 +71,7 @@ def test_wrong_matches_are_left_out():
     wrong = rng.permutation(len(before.seen))[:60]
     names = after.descriptors.copy()
     names[wrong] = names[np.roll(wrong, 1)]  # two fifths of the matches join different points
-    found = tracking.find_motion(before, replace(after, descriptors=names), RIG)
+    found = tracking.find_motion(before, replace(after, descriptors=names), RIG, MOTION)
     assert found.seen
     np.testing.assert_allclose(told(found), [0.05, -0.02, 0.5], atol=1e-4)
 
@@ -97,15 +98,21 @@ def test_too_little_in_common_is_no_motion():
         (before, replace(after, descriptors=other)),
         (straight, straight),
     ):
-        found = tracking.find_motion(a, b, RIG)
+        found = tracking.find_motion(a, b, RIG, MOTION)
         assert np.all(np.isfinite(told(found))) and np.all(np.isfinite(found.cov))
         assert not found.seen or (a is straight)
+
+
+def test_a_motion_far_from_dead_reckoning_is_not_believed():
+    for astray in ([0.12, -0.02, 0.5], [0.05, -0.02, 0.9]):
+        assert not tracking.find_motion(*scene(), RIG, np.array(astray)).seen
+    assert tracking.find_motion(*scene(), RIG, MOTION + [0, 0, 2 * np.pi]).seen
 
 
 def test_duplicated_points_count_but_do_no_harm():
     before, after = scene()
     twice = np.concatenate([np.arange(150), np.arange(20)])
-    found = tracking.find_motion(cut(before, twice), cut(after, twice), RIG)
+    found = tracking.find_motion(cut(before, twice), cut(after, twice), RIG, MOTION)
     assert found.seen
     np.testing.assert_allclose(told(found), [0.05, -0.02, 0.5], atol=1e-4)
 
@@ -138,7 +145,7 @@ def test_rendered_pairs_tell_the_motion(sensor, arena):
     for k, (dx, dy, dyaw) in enumerate([(0.05, 0.0, 0.0), (0.035, 0.035, np.pi / 4), (0.0, 0.0, np.pi / 2)]):
         c, s = np.cos(yaw), np.sin(yaw)
         second = shot(sensor, arena, x + c * dx - s * dy, y + s * dx + c * dy, yaw + dyaw, tilt=0.005, seed=2 + k)
-        found = tracking.find_motion(first, second, RIG)
+        found = tracking.find_motion(first, second, RIG, np.array([dx, dy, dyaw + 0.05]))
         assert found.seen
         error = told(found) - [dx, dy, dyaw]
         assert np.all(np.abs(error[:2]) < 0.0015) and abs(error[2]) < np.deg2rad(0.15), error
@@ -147,10 +154,10 @@ def test_rendered_pairs_tell_the_motion(sensor, arena):
 def test_plain_arenas_and_views_with_nothing_in_common_tell_nothing(sensor, arena):
     x, y, yaw = (float(v) for v in arena.start_xyyaw)
     first, behind = shot(sensor, arena, x, y, yaw), shot(sensor, arena, x, y, yaw + np.pi)
-    assert not tracking.find_motion(first, behind, RIG).seen
+    assert not tracking.find_motion(first, behind, RIG, np.array([0, 0, np.pi])).seen
     boxes = replace(arena.boxes, contrast=np.zeros_like(arena.boxes.contrast))
     marks = replace(arena.landmarks, used=np.zeros_like(arena.landmarks.used))
     plain = replace(arena, boxes=boxes, landmarks=marks, floor_contrast=np.float32(0))
     nothing = shot(sensor, plain, x, y, yaw)
-    found = tracking.find_motion(nothing, shot(sensor, plain, x + 0.05, y, yaw, seed=3), RIG)
+    found = tracking.find_motion(nothing, shot(sensor, plain, x + 0.05, y, yaw, seed=3), RIG, np.array([0.05, 0, 0]))
     assert not found.seen and len(nothing.seen) < tracking.LEAST
