@@ -79,12 +79,12 @@ def answer(found: Findings) -> list[str]:
     near = [item.number for item in PUBLISHED if close(item, found)]
     said.append(
         f"Of the four with a published time, {len(near)} end within {100 * WORTH:.0f} % of it"
-        + (f" (experiments {' and '.join(map(str, near))})." if near else ".")
+        + (f" ({numbered(near)})." if near else ".")
     )
     right = [item.number for item in PUBLISHED if walks_as_far(item, found)]
     said.append(
         f"Distances are within {100 * FAR:.0f} cm of the paper's (travelled in experiments 4 and 5, else straight) in "
-        f"{len(right)} of them" + (f": experiments {' and '.join(map(str, right))}." if right else ".")
+        f"{len(right)} of them" + (f": {numbered(right)}." if right else ".")
     )
     if found.fit:
         said.append(
@@ -92,6 +92,12 @@ def answer(found: Findings) -> list[str]:
             f"(default: {found.default:g} s)."
         )
     return said
+
+
+def numbered(numbers: list[int]) -> str:
+    """As in "experiments 3, 5 and 6"."""
+    *most, last = map(str, numbers)
+    return f"experiments {', '.join(most)} and {last}" if most else f"experiment {last}"
 
 
 def close(item: Experiment, found: Findings) -> bool:

@@ -23,6 +23,7 @@ from jaxbiped.study.reproduction.saved import Population, break_even, measured_b
 
 BAR, PAPER = "#0072B2", "#D55E00"
 BINS = 30
+OUTER = 0.005  # share of the arenas, on each side, that would make a histogram wide
 WIDTHS, DETOURS = 4, 6  # of the map
 FEWEST = 5  # arenas of a cell of the map
 EQUATION_1 = 2 * (10 - 1) / (1 + 1) * CELL  # [m] of floor cells that cost what two steps cost more: 2 (C3 - C1)
@@ -35,12 +36,13 @@ def population_section(population: Population, measure: float) -> Section:
     plots = []
     with themed():
         for kind in (DISTANCE, TIME):
-            caption = f"Saved {kind.name} by going over bumps, on {len(population.both):,} arenas that both solved."
+            caption = f"Saved {kind.name} by going over bumps, on {len(population.both):,} arenas that both solved. "
+            caption += f"The outermost bars hold the {100 * OUTER:g} % that lie further out on each side."
             label = f"saved-{kind.name}-{population.executor}"
             plots.append(Plot(inline(histogram(population, kind), label, caption), caption))
         caption = (
-            f"Mean minutes saved{'' if population.always is None else ' where it is always crossed'}, by the width of "
-            "the bump along the way and the detour round it. Framed: the interval leaves zero out. Line: where two "
+            f"Median minutes saved{'' if population.always is None else ' where it is always crossed'}, by the width "
+            "of the bump along the way and the detour round it. Framed: the interval leaves zero out. Line: where two "
             f"steps take as long as the detour by Table 2 alone, {centimetres(break_even(measure))}."
         )
         plots.append(Plot(inline(pay_map(population, measure), f"pays-{population.executor}", caption), caption))
@@ -91,8 +93,8 @@ def mean(values: np.ndarray) -> str:
 
 
 def ordinal(value: float) -> str:
-    """As in "99.5th"."""
-    text = f"{value:.1f}".removesuffix(".0")
+    """As in "71st"; with a decimal where a whole number would say none or all."""
+    text = f"{value:.0f}" if 1 <= value <= 99 else f"{value:.1f}".removesuffix(".0")
     if "." in text or text[-2:] in ("11", "12", "13"):
         return f"{text}th"
     return text + {"1": "st", "2": "nd", "3": "rd"}.get(text[-1], "th")
@@ -103,7 +105,9 @@ def histogram(population: Population, kind: Measure) -> Figure:
     column, paper = COLUMNS[kind.name]
     saved = population.both[column].to_numpy() * kind.scale
     figure, ax = canvas(WIDTH, 3.2)
-    ax.hist(saved, bins=BINS, color=BAR)
+    low, high = np.quantile(saved, [OUTER, 1 - OUTER])
+    shown = np.array([min(low, 0.0), max(high, paper * kind.scale)])
+    ax.hist(np.clip(saved, *shown), bins=np.linspace(*shown + np.array([-1e-6, 1e-6]), BINS + 1), color=BAR)
     ax.axvline(0, color=INK, lw=1)
     ax.axvline(paper * kind.scale, color=PAPER, lw=2)
     place = ordinal(100 * population.percentile(column, paper))
@@ -126,7 +130,7 @@ def edges(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def pay_map(population: Population, measure: float) -> Figure:
-    """Mean saved time over width and detour."""
+    """Median saved time over width and detour: a few missions that wander would make a mean theirs."""
     both = population.tried
     width, detour, saved = (both[name].to_numpy() for name in ("width", "detour", "saved_time"))
     across, along = edges(width, WIDTHS), edges(detour, DETOURS)
@@ -136,8 +140,8 @@ def pay_map(population: Population, measure: float) -> Figure:
     for i, j in np.ndindex(values.shape):
         inside = saved[(row == i) & (column == j)] / 60
         if len(inside) >= FEWEST:
-            estimate, _ = mean_and_median(inside, seed=0, resamples=999)
-            values[i, j] = estimate.estimate
+            _, estimate = mean_and_median(inside, seed=0, resamples=999)
+            values[i, j] = round(estimate.estimate, 1) + 0.0  # of which none is a negative zero
             shown[i, j] = estimate.low is not None and not estimate.low <= 0 <= estimate.high
     figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
     ax = figure.subplots()

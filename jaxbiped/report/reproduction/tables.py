@@ -114,7 +114,16 @@ def fit_sheet(fit: Measuring, records: Mapping[int, Record], title: str = "") ->
             signed(100 * left / (60 * item.minutes), 0),
             number(fit.alone[item.number], 1),
         ))  # fmt: skip
-    columns = ("experiment", "moving\nmin", "measurements", "time\nmin", "paper\nmin", "off\nmin", "%", "alone\ns")
+    columns = (
+        "experiment",
+        "moving\nmin",
+        "measurements",
+        "time\nmin",
+        "paper's\nmin",
+        "off\nmin",
+        "off\n%",
+        "alone\ns",
+    )
     rms = np.sqrt(np.mean(np.square(list(fit.residuals.values())))) if fit.residuals else 0.0
     return Sheet(
         f"{title or 'A'} measurement takes {fit.seconds:.1f} s",
@@ -195,7 +204,7 @@ def table_2_sheet(verified: Sequence[Verified]) -> Sheet:
             f"{1e3 * each.margin:.0f}",
             f"{1e3 * each.least_margin:.0f}",
         ))  # fmt: skip
-    columns = ("primitive", "paper\ns", "ours\ns", "carries", "off\nmm", "success\n%", "ZMP\nmm", "at worst\nmm")
+    columns = ("primitive", "paper's\ns", "ours\ns", "carries", "off\nmm", "success\n%", "ZMP\nmm", "at worst\nmm")
     trials = verified[0].trials if verified else 0
     return Sheet(
         "Table 2: the primitives, simulated",
