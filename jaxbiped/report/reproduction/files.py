@@ -13,8 +13,10 @@ import polars as pl
 
 from jaxbiped.files import new_folder, write_whole
 from jaxbiped.mission.recording import FILE, save_log
+from jaxbiped.report.pictures import save_figure
 from jaxbiped.report.reproduction.page import PAGE, answer, build
-from jaxbiped.report.reproduction.population import COLUMNS
+from jaxbiped.report.reproduction.population import COLUMNS, population_figure
+from jaxbiped.report.reproduction.robot import strip
 from jaxbiped.study.reproduction.account import Record
 from jaxbiped.study.reproduction.findings import Findings
 from jaxbiped.study.reproduction.paper import EXPERIMENTS
@@ -39,11 +41,26 @@ def write(out: Path, found: Findings, args: dict[str, Any], facts: dict[str, str
         write_whole(folder / MISSIONS, saver(buffer.getvalue()))
         for each in found.populations:
             each.both.write_parquet(folder / f"saved_{each.executor}.parquet")
+        pictures = save_pictures(folder, found)
         for item in EXPERIMENTS:
             (folder / item.scene).mkdir()
             save_log(folder / item.scene / FILE, found.logs[item.number], {"scene": item.scene, "args": args})
     others = [f"saved_{each.executor}.parquet" for each in found.populations]
-    return [*texts, MISSIONS, *others, f"{EXPERIMENTS[0].scene} to {EXPERIMENTS[-1].number}"]
+    return [*texts, MISSIONS, *others, *pictures, f"{EXPERIMENTS[0].scene} to {EXPERIMENTS[-1].number}"]
+
+
+def save_pictures(folder: Path, found: Findings) -> list[str]:
+    """The robot, and each population, as files of their own; their names."""
+    names = []
+    robot = strip(found.logs, found.config.walk.biped)
+    if robot is not None:
+        names.append("robot.png")
+        write_whole(folder / names[-1], lambda file: robot.save(file, format="PNG"))
+    for each in found.populations:
+        if not each.both.is_empty():
+            names.append(f"saved_{each.executor}.png")
+            save_figure(population_figure(each, found.measure), folder / names[-1])
+    return names
 
 
 def saver(data: bytes) -> Callable[[Any], object]:

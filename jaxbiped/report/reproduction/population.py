@@ -9,7 +9,7 @@ from matplotlib.ticker import ScalarFormatter
 
 from jaxbiped.motion.primitives import CELL
 from jaxbiped.report.answer import DISTANCE, TIME, Measure
-from jaxbiped.report.figures import canvas
+from jaxbiped.report.figures import canvas, style
 from jaxbiped.report.grid import to_grid
 from jaxbiped.report.page import Section
 from jaxbiped.report.plots import WIDTH, Plot
@@ -33,22 +33,35 @@ COLUMNS = {"distance": ("saved_distance", SAVED[0]), "time": ("saved_time", 60 *
 def population_section(population: Population, measure: float) -> Section:
     """One population: its pictures and tables."""
     name = f"{population.arenas:,} random bumps, executor {population.executor}, sensor {population.sensor}"
+    plots = () if population.both.is_empty() else drawn(population, measure)
+    comparison = population.comparison
+    sheets = [strategy_sheet(comparison), pair_sheet(comparison), code_sheet(comparison)]
+    return Section(name, tuple(sentences(population, measure)), plots, tuple(to_grid(each) for each in sheets))
+
+
+def drawn(population: Population, measure: float) -> tuple[Plot, ...]:
+    """The figures of one population, which has arenas that both solved."""
     plots = []
+
+    def add(name: str, figure: Figure, caption: str) -> None:
+        plots.append(Plot(inline(figure, f"{name}-{population.executor}", caption), caption))
+
     with themed():
         for kind in (DISTANCE, TIME):
+            figure, ax = canvas(WIDTH, 3.2)
+            histogram(ax, population, kind)
             caption = f"Saved {kind.name} by going over bumps, on {len(population.both):,} arenas that both solved. "
             caption += f"The outermost bars hold the {100 * OUTER:g} % that lie further out on each side."
-            label = f"saved-{kind.name}-{population.executor}"
-            plots.append(Plot(inline(histogram(population, kind), label, caption), caption))
+            add(f"saved-{kind.name}", figure, caption)
+        figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
+        pay_map(figure.subplots(), population, measure)
         caption = (
             f"Median minutes saved{'' if population.always is None else ' where it is always crossed'}, by the width "
             "of the bump along the way and the detour round it. Framed: the interval leaves zero out. Line: where two "
             f"steps take as long as the detour by Table 2 alone, {centimetres(break_even(measure))}."
         )
-        plots.append(Plot(inline(pay_map(population, measure), f"pays-{population.executor}", caption), caption))
-    comparison = population.comparison
-    sheets = [strategy_sheet(comparison), pair_sheet(comparison), code_sheet(comparison)]
-    return Section(name, tuple(sentences(population, measure)), tuple(plots), tuple(to_grid(each) for each in sheets))
+        add("pays", figure, caption)
+    return tuple(plots)
 
 
 def centimetres(metres: float) -> str:
@@ -100,11 +113,22 @@ def ordinal(value: float) -> str:
     return text + {"1": "st", "2": "nd", "3": "rd"}.get(text[-1], "th")
 
 
-def histogram(population: Population, kind: Measure) -> Figure:
+def population_figure(population: Population, measure: float) -> Figure:
+    """Both histograms and the map side by side."""
+    figure = Figure(figsize=(2.6 * WIDTH, 3.6), layout="constrained")
+    first, second, third = figure.subplots(1, 3)
+    for ax, kind in ((first, DISTANCE), (second, TIME)):
+        style(ax, "y")
+        histogram(ax, population, kind)
+    pay_map(third, population, measure)
+    third.set_title("minutes saved" if population.always is None else "minutes saved by always crossing", fontsize=10)
+    return figure
+
+
+def histogram(ax: Axes, population: Population, kind: Measure) -> None:
     """Arenas by what they saved, with the paper's case."""
     column, paper = COLUMNS[kind.name]
     saved = population.both[column].to_numpy() * kind.scale
-    figure, ax = canvas(WIDTH, 3.2)
     low, high = np.quantile(saved, [OUTER, 1 - OUTER])
     shown = np.array([min(low, 0.0), max(high, paper * kind.scale)])
     ax.hist(np.clip(saved, *shown), bins=np.linspace(*shown + np.array([-1e-6, 1e-6]), BINS + 1), color=BAR)
@@ -120,7 +144,6 @@ def histogram(population: Population, kind: Measure) -> Figure:
     ax.yaxis.set_major_formatter(ScalarFormatter())
     ax.set_xlabel(f"saved {kind.name} [{kind.unit}]")
     ax.set_ylabel("arenas")
-    return figure
 
 
 def edges(values: np.ndarray, count: int) -> np.ndarray:
@@ -129,7 +152,7 @@ def edges(values: np.ndarray, count: int) -> np.ndarray:
     return np.linspace(low, high if high > low else low + 1.0, count + 1)
 
 
-def pay_map(population: Population, measure: float) -> Figure:
+def pay_map(ax: Axes, population: Population, measure: float) -> None:
     """Median saved time over width and detour: a few missions that wander would make a mean theirs."""
     both = population.tried
     width, detour, saved = (both[name].to_numpy() for name in ("width", "detour", "saved_time"))
@@ -143,14 +166,11 @@ def pay_map(population: Population, measure: float) -> Figure:
             _, estimate = mean_and_median(inside, seed=0, resamples=999)
             values[i, j] = round(estimate.estimate, 1) + 0.0  # of which none is a negative zero
             shown[i, j] = estimate.low is not None and not estimate.low <= 0 <= estimate.high
-    figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
-    ax = figure.subplots()
     fill_map(ax, values, shown, Panel("", 1.0, 1, True, BETTER_UP))
     ticks(ax, across, along)
     place = (break_even(measure) - along[0]) / (along[1] - along[0]) - 0.5
     if -0.5 < place < DETOURS - 0.5:
         ax.axhline(place, color=PAPER, lw=2, ls="--")
-    return figure
 
 
 def ticks(ax: Axes, across: np.ndarray, along: np.ndarray) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+from collections.abc import Mapping
 from html import escape
 
 import numpy as np
@@ -16,14 +17,16 @@ from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.report.plots import Plot
 from jaxbiped.report.reproduction.scenery import frames_of, nearest_to, photographs
-from jaxbiped.study.reproduction.paper import Experiment
+from jaxbiped.study.reproduction.paper import EXPERIMENTS, Experiment
 
 STAGES = (0.3, 0.5, 0.7)  # of a step over an edge
 STEPS = {
     "Stepping up": NAMES[Primitive.STEP_UP_BUMP],
     "Stepping down": NAMES[Primitive.STEP_DOWN_BUMP],
 }
+HIGHEST = "At the highest place of its way."
 QUALITY = 85  # of JPEG
+SMALL, GAP = (400, 300), 8  # [px] of a picture in a strip, and between two
 ABREAST = -90.0  # [deg] a camera on the robot's left
 
 
@@ -41,6 +44,31 @@ def robot_plots(item: Experiment, log: MissionLog, robot: RobotModelConfig) -> t
     return [Plot(photo(shot, caption), caption) for shot, caption in zip(shots, wanted, strict=True)], ""
 
 
+def strip(logs: Mapping[int, MissionLog], robot: RobotModelConfig) -> Image.Image | None:
+    """The robot stepping up, on the bump, stepping down (experiment 5), and under the gate (6), side by side.
+
+    None where one of these is not in the logs, or nothing can be rendered.
+    """
+    over, through = EXPERIMENTS[4], EXPERIMENTS[5]
+    if any(logs[item.number].walk is None for item in (over, through)):
+        return None
+    stepping, squatting = moments(over, logs[over.number]), moments(through, logs[through.number])
+    wanted = [f"{name}, 2 of {len(STAGES)}." for name in STEPS]
+    if not all(name in stepping for name in wanted):
+        return None
+    chosen = [stepping[wanted[0]], stepping[HIGHEST], stepping[wanted[1]]]
+    try:
+        shots = photographs(logs[over.number], robot, chosen, side=ABREAST)
+        shots += photographs(logs[through.number], robot, list(squatting.values()), through=True)
+    except InputError:
+        return None
+    width, height = SMALL
+    picture = Image.new("RGB", (len(shots) * (width + GAP) - GAP, height), "white")
+    for k, shot in enumerate(shots):
+        picture.paste(shot.resize(SMALL), (k * (width + GAP), 0))
+    return picture
+
+
 def moments(item: Experiment, log: MissionLog) -> dict[str, int]:
     """Captions, and numbers of states of `log.walk`."""
     wanted: dict[str, int] = {}
@@ -49,7 +77,7 @@ def moments(item: Experiment, log: MissionLog) -> dict[str, int]:
             frames = frames_of(log, action)
             for k, stage in enumerate(STAGES if frames else (), start=1):
                 wanted[f"{name}, {k} of {len(STAGES)}."] = frames[int(stage * (len(frames) - 1))]
-        wanted["At the highest place of its way."] = int(np.argmax(log.walk.qpos[:, 2]))
+        wanted[HIGHEST] = int(np.argmax(log.walk.qpos[:, 2]))
     elif item.gate:
         wanted["Squatting under the lintel, which is drawn to be seen through."] = nearest_to(log, "gate")[0]
     elif any(outline.kind == "obstacle" for outline in log.outlines):
