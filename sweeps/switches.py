@@ -3,6 +3,9 @@
     python sweeps/switches.py heading [--arenas N] [--executor sampled]           (planning over cells and headings)
     python sweeps/switches.py foot-placement [--arenas N] [--executor native]     (feet placed by measured edges)
 
+Off foot placement, ask `native`: what `sampled` draws from was measured of steps that are placed about right, and it
+makes robots fall that simulated ones save by stopping at an edge and stepping back (`mission.judging`).
+
 Prints how the missions ended, and the paired differences with their intervals, over all arenas and by family: the
 switch on, less off. `jaxbiped compare --planner heading`, or `--foot-placement False`, keeps such missions in a folder,
 and `jaxbiped compare FOLDER FOLDER` compares two.
@@ -40,7 +43,7 @@ class Switch:
 SWITCHES = {
     "heading": Switch({"planner": "heading"}, {"planner": "cell"}, "kinematic", FAMILIES),
     "foot-placement": Switch(
-        {"foot_placement": True}, {"foot_placement": False}, "sampled", ("bump", "stairs", "mixed")
+        {"foot_placement": True}, {"foot_placement": False}, "native", ("bump", "stairs", "mixed")
     ),
 }
 
