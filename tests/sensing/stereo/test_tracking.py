@@ -106,7 +106,7 @@ def test_too_little_in_common_is_no_motion():
 def test_a_motion_far_from_dead_reckoning_is_not_believed():
     for astray in ([0.12, -0.02, 0.5], [0.05, -0.02, 0.9]):
         assert not tracking.find_motion(*scene(), RIG, np.array(astray)).seen
-    assert tracking.find_motion(*scene(), RIG, MOTION + [0, 0, 2 * np.pi]).seen
+    assert tracking.find_motion(*scene(), RIG, MOTION + np.array([0, 0, 2 * np.pi])).seen
 
 
 def test_duplicated_points_count_but_do_no_harm():
