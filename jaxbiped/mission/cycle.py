@@ -139,8 +139,8 @@ def conclude(
     belief = predict(mind.belief, *executed.moved, executed.variances)
     belief = replace(belief, pose=climbed(belief.pose, command.rise, program.spec))
     pose = jax.tree.map(lambda new, old: jnp.where(stays, old, new), executed.pose, world.pose)
-    since = settings.durations.measure + jnp.where(stays, 0.0, executed.time)
-    time = world.time + since
+    acted = jnp.where(stays, 0.0, executed.time)
+    time = world.time + settings.durations.measure + acted
     decisions = world.decisions + 1
     away = jnp.hypot(arena.goal_xy[0] - pose.x, arena.goal_xy[1] - pose.y)
 
@@ -167,4 +167,4 @@ def conclude(
         before=None if world.before is None else world.pose,
     )
     mind = carried_on(walked(mind, command, executed.moved, executed.variances), executed.moved, executed.variances)
-    return world, replace(mind, belief=belief, since=since)
+    return world, replace(mind, belief=belief, since=settings.durations.measure + acted)
