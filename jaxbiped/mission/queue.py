@@ -55,7 +55,7 @@ class Result:
     yaw_error: Float[Array, "N"]  # [rad] the same of its yaw
 
 
-def ending(world: World, goal_xy: Float[Array, "*N 2"]) -> Result:
+def ending(world: World, goal_xy: Float[Array | np.ndarray, "*N 2"]) -> Result:
     """How missions ended whose worlds these are, in arenas with these goals."""
     away = jnp.hypot(goal_xy[..., 0] - world.pose.x, goal_xy[..., 1] - world.pose.y)
     done = world.code, world.distance, world.time, world.measurements, world.decisions
