@@ -53,7 +53,8 @@ def quickest(
     """The field of the planner `heading`: times of the mission's own clock."""
     extra = None
     if program.footing:
-        extra = seconds_of_a_unit(settings)[:, None, None, None] * rim_costs(classes, levels, program.spec.pitch)
+        unit = seconds_of_a_unit(settings).reshape(-1, 1, 1, 1)  # of each robot, or of all
+        extra = unit * rim_costs(classes, levels, program.spec.pitch)
     return planning.heading_field(
         classes, levels, times_of(settings), settings.strategy.rules(), goal_ij, program.spec.pitch, extra
     )

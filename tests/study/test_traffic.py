@@ -1,6 +1,5 @@
 """Studies of arenas that move: what they refuse, and that the speed of obstacles is what decides."""
 
-import numpy as np
 import polars as pl
 import pydantic
 import pytest
@@ -40,5 +39,5 @@ def test_blocks_that_stand_are_gone_round_and_fast_ones_collide():
         rows = pl.concat([frame for _, frame in evaluate(config)])
         assert set(rows["family"]) == {"traffic"}
         assert set(rows["code"]) <= {"reached", "collided", "no_path"}
-        shares[speed] = np.mean(rows["success"])
+        shares[speed] = rows["success"].mean()
     assert shares[0.0] > 0.95 and shares[0.02] < 0.6
