@@ -28,11 +28,23 @@ from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.sensing.localisation import Belief, correct
-from jaxbiped.sensing.presets import sensor_preset
+from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.stereo import landmarks, matching
 from jaxbiped.sensing.stereo.fit import quality, together
-from jaxbiped.study.fitting import eye, least_contrast, unmarked, watch_from
-from jaxbiped.study.sensors import AREA, around, fused, looking, mission, same, score, standing, worlds
+from jaxbiped.study.fitting import choices, eye, least_contrast, unmarked, watch_from
+from jaxbiped.study.sensors import (
+    AREA,
+    agreement,
+    around,
+    fused,
+    looking,
+    mission,
+    same,
+    score,
+    standing,
+    with_rays,
+    worlds,
+)
 
 PRESET = Path(__file__).parents[1] / "configs" / "sensors" / "stereo.toml"
 SEED, FIRST = 7, 1000  # of arenas that are in no fit
@@ -40,7 +52,6 @@ LOST = (0.03, 0.03, np.deg2rad(3))  # [m, m, rad] by which a robot is off before
 NEAR = 1.2  # [m]
 REPEATS, AT_ONCE = 20, 2
 DRAWS = 4000
-RAYS = (64, 48), (64, 64), (128, 96)
 update = jax.jit(correct)
 
 
@@ -134,20 +145,26 @@ def poses(places, eyes, config) -> None:
 
 def sensors(places, look, eyes, config, missions) -> None:
     """The ray-cast sensor with the preset in the same places, and in whole missions."""
-    cast = config.model_copy(update={"sensor": "raycast"})
+    fitted = RayConfig(columns=config.camera.columns, rows=config.camera.rows)
     stereo = np.stack([fused(place, look, config)[0] for place in places])
-    for columns, rows in RAYS:
-        how = cast.model_copy(update={"camera": CameraConfig(columns=columns, rows=rows)})
-        ours = np.stack([fused(place, looking(how, None), how)[0] for place in places])
-        both, equal = (stereo != Cell.UNMEASURED) & (ours != Cell.UNMEASURED), stereo == ours
-        print(f"sensors   {columns} x {rows} rays: {equal.mean():.3f} of the fused cells are those of stereo "
-              f"(wanted: 0.92), {equal[both].mean():.3f} of those that both measured", flush=True)  # fmt: skip
+    for rays in (fitted, *(few for few in choices(CameraConfig()) if few != fitted)):
+        how = with_rays(config, rays)
+        same_cells, measured = agreement(stereo, np.stack([fused(p, looking(how, None), how)[0] for p in places]))
+        whose = "the preset's " if rays == fitted else ""
+        print(f"sensors   {whose}{rays.columns} x {rays.rows} rays: {same_cells:.3f} of the fused cells are those of "
+              f"stereo (wanted: 0.92), {measured:.3f} of those that both measured", flush=True)  # fmt: skip
     if missions:
-        alike = sum(same(mission(p, config, eyes), mission(p, cast, None)) for p in places[:missions])
+        pairs = [[mission(p, how, sees) for how, sees in ((config, eyes), (with_rays(config, fitted), None))]
+                 for p in places[:missions]]  # fmt: skip
+        alike = sum(same(*pair) for pair in pairs)
         low, high = proportion_confint(alike, missions, method="wilson")
         print(
             f"missions  {alike} of {missions} end alike: {alike / missions:.0%} [{low:.0%}, {high:.0%}] (wanted: 90%)"
         )
+        for k, pair in enumerate(pairs):
+            if not same(*pair):
+                told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
+                print(f"          arena {FIRST + k}: {told}")
 
 
 def speed(place, eyes, config) -> None:
@@ -217,8 +234,7 @@ def main() -> None:
         "--preset", default=PRESET, help="sensor file of the ray-cast sensor; what both expect of landmarks"
     )
     options = parser.parse_args()
-    known = sensor_preset(str(options.preset))
-    config = MissionConfig(sensor="stereo", stereo=known.stereo, landmarks=known.landmarks)
+    config = MissionConfig(sensor="stereo", preset=str(options.preset))
     with contextlib.closing(StereoEyes(config.camera)) as eyes:
         places = list(worlds(SEED, FIRST, options.arenas, options.views, config))
         speed(places[0], eyes, config)

@@ -15,15 +15,12 @@ from jaxbiped import config
 from jaxbiped.arenas.arena import CIRCLE
 from jaxbiped.config import Model, config_hash
 from jaxbiped.files import refuse_existing, write_whole
-from jaxbiped.mapping import Cell
 from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.sensing.noise import NoiseConfig
-from jaxbiped.study.fitting import Fit, fit, sensor_toml
-from jaxbiped.study.sensors import Place, fused, looking, mission, same, score, worlds
-
-FINER = 2  # times as many rays: so that far cells are hit as often as a pixel of a picture falls on them
+from jaxbiped.study.fitting import ALIKE, Fit, choices, fit, sensor_toml
+from jaxbiped.study.sensors import Place, agreement, fused, looking, mission, same, score, with_rays, worlds
 
 
 class FitSensorArgs(Model):
@@ -77,7 +74,7 @@ def main(args: FitSensorArgs) -> int:
 
 def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
     """What was measured, for people."""
-    q, stereo, marks = found.quality, found.sensor.stereo, found.sensor.landmarks
+    q, stereo, marks, cast = found.quality, found.sensor.stereo, found.sensor.landmarks, found.sensor.rays
     seen = [sight for sight in found.sights if sight.error is not None]
     discs = sum(sight.kind == CIRCLE for sight in seen)
     off = np.median([np.hypot(*sight.error) for sight in seen]) if seen else np.nan
@@ -89,19 +86,19 @@ def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
         f"landmarks  {len(seen)} found ({discs} discs) of {len(found.sights)} in view, {1e3 * off:.1f} mm off in the "
         f"median; sd {1e3 * marks.sd:.1f} mm + {1e3 * marks.sd_per_metre:.1f} mm/m; discs to "
         f"{marks.furthest_circle:.2f} m, squares to {marks.furthest_square:.2f} m",
+        f"rays       {cast.columns} x {cast.rows}: {found.same:.1%} of these arenas' cells are those of stereo "
+        f"(wanted: {ALIKE:.0%})",
     ]
 
 
 def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, found: Fit, missions: int) -> None:
     """Print how close both sensors come on arenas that were not fitted to: with the fitted noise, and as it was."""
     rendered = rendered.model_copy(update={"stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})
-    fitted = rendered.model_copy(update={"sensor": "raycast"})
-    before = rendered.model_copy(update={"sensor": "raycast", "stereo": NoiseConfig()})
-    many = {"columns": FINER * rendered.camera.columns, "rows": FINER * rendered.camera.rows}
-    finer = fitted.model_copy(update={"camera": rendered.camera.model_copy(update=many)})
-    each = {"stereo": (rendered, eyes), "fitted": (fitted, None), "finer": (finer, None), "before": (before, None)}
-    if rendered.camera.width % many["columns"] or rendered.camera.height % many["rows"]:
-        del each["finer"]
+    fitted = with_rays(rendered, found.sensor.rays)
+    before = fitted.model_copy(update={"stereo": NoiseConfig()})
+    others = {f"{rays.columns} x {rays.rows}": (with_rays(rendered, rays), None)
+              for rays in choices(rendered.camera) if rays != found.sensor.rays}  # fmt: skip
+    each = {"stereo": (rendered, eyes), "fitted": (fitted, None)} | others | {"before": (before, None)}
     maps = {name: [] for name in each}
     show = Console(stderr=True)
     for place in track(places, description="maps", console=show, transient=True):
@@ -111,11 +108,11 @@ def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, foun
     count = len(places) * len(places[0].poses)
     print(f"maps       {len(places)} other arenas, {count} views; cells that are those of stereo:")
     for name in list(each)[1:]:
-        ours, how = np.stack(maps[name]), each[name][0].camera
-        both = (stereo != Cell.UNMEASURED) & (ours != Cell.UNMEASURED)
+        how = each[name][0].camera
+        share, measured = agreement(stereo, np.stack(maps[name]))
         noise = "the preset `rendered`" if name == "before" else "the fitted noise"
-        print(f"           {np.mean(stereo == ours):.1%} with {noise} and {how.columns} x {how.rows} rays, "
-              f"{np.mean((stereo == ours)[both]):.1%} of what both measured")  # fmt: skip
+        print(f"           {share:.1%} with {noise} and {how.columns} x {how.rows} rays, "
+              f"{measured:.1%} of what both measured")  # fmt: skip
     for name in ("stereo", "fitted"):
         rated = score(maps[name], [place.classes for place in places])
         kinds = ", ".join(f"{kind} {rated.recall[kind]:.3f} / {rated.precision[kind]:.3f}" for kind in rated.recall)

@@ -84,7 +84,7 @@ class MissionConfig(Model):
     """`stereo`: pairs of pictures, rendered and matched on the host."""
     preset: str = "rendered"
     """How well the camera measures, the default of each number of `stereo` and `landmarks`: ideal, rendered, real, or a
-    sensor file (.toml), as `jaxbiped fit-sensor` writes it."""
+    sensor file (.toml), as `jaxbiped fit-sensor` writes it, which says how many rays the camera has, too."""
     executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
     """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
     MuJoCo's own batch or in MJX."""
@@ -135,6 +135,9 @@ class MissionConfig(Model):
         for name in ("stereo", "landmarks"):
             given = data.get(name, {})
             filled[name] = getattr(preset, name).model_dump() | given if isinstance(given, dict) else given
+        camera = data.get("camera", {})
+        if preset.rays and isinstance(camera, dict):
+            filled["camera"] = preset.rays.model_dump() | camera
         return data | filled
 
     @pydantic.field_validator("preset")

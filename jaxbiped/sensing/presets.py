@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pydantic import Field
+
 from jaxbiped import config
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
@@ -15,13 +17,24 @@ from jaxbiped.sensing.landmarks import LandmarkConfig
 from jaxbiped.sensing.noise import NoiseConfig
 
 
+class RayConfig(Model):
+    """How many rays stand for a picture, which both must divide."""
+
+    columns: int = Field(ge=4)
+    """Rays across the image."""
+    rows: int = Field(ge=4)
+    """Rays down the image."""
+
+
 class SensorConfig(Model):
-    """A sensor file: noise of the points and of the landmarks."""
+    """A sensor file: noise of the points and of the landmarks, and perhaps how many rays it takes."""
 
     stereo: NoiseConfig = noise.RENDERED
     """Of stereo matching."""
     landmarks: LandmarkConfig = landmarks.RENDERED
     """Of finding landmarks."""
+    rays: RayConfig | None = None
+    """In place of the camera's own, where this is given and they are not."""
 
 
 PRESETS = {

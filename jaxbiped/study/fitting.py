@@ -13,15 +13,17 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.eyes import StereoEyes, where
 from jaxbiped.mission.settings import MissionConfig, Settings, program
-from jaxbiped.sensing.camera import Mount
+from jaxbiped.sensing.camera import CameraConfig, Mount
 from jaxbiped.sensing.landmarks import LandmarkConfig, sight
-from jaxbiped.sensing.presets import SensorConfig
+from jaxbiped.sensing.presets import RayConfig, SensorConfig
 from jaxbiped.sensing.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
 from jaxbiped.sensing.stereo.fit_landmarks import Sight, fit_landmarks
-from jaxbiped.study.sensors import AREA, Place, standing
+from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, standing, with_rays
 
 CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # at which the least one that can be matched is looked for
 CONTRAST_PLACES, CONTRAST_VIEWS = 3, 2
+MORE_RAYS = (1, 3), (1, 4), (2, 6)  # times the camera's across, and thirds of its down: far cells are low in a picture
+ALIKE = 0.92  # share of the cells that is to be that of rendered pairs
 NEVER_FURTHER = LandmarkConfig(sd=0, sd_per_metre=0, nearest=0, furthest_circle=100, furthest_square=100)
 
 
@@ -34,6 +36,7 @@ class Fit:
     plain: float  # share of surfaces without texture, rims left out, that comes out as something
     sights: tuple[Sight, ...]  # landmarks
     views: int
+    same: float  # share of the fused cells that the ray-cast sensor, fitted, has as rendered pairs have them
 
 
 def fit(
@@ -57,13 +60,36 @@ def fit(
     least, plain = least_contrast(places, eyes, settings, config)
     seen = together(watched)
     stereo = fit_noise(seen, config.stereo).model_copy(update={"min_contrast": round(least, 4)})
+    marks = fit_landmarks(sights, config.landmarks)
+    cast, same = fewest_rays(places, eyes, config.model_copy(update={"stereo": stereo, "landmarks": marks}))
     return Fit(
-        SensorConfig(stereo=stereo, landmarks=fit_landmarks(sights, config.landmarks)),
-        quality(seen),
-        plain,
-        tuple(sights),
-        count,
+        SensorConfig(stereo=stereo, landmarks=marks, rays=cast), quality(seen), plain, tuple(sights), count, same
     )
+
+
+def choices(camera: CameraConfig) -> list[RayConfig]:
+    """Numbers of rays that divide a camera's picture, fewest first: its own, and `MORE_RAYS`."""
+    several = [(camera.columns * across, camera.rows * thirds // 3) for across, thirds in MORE_RAYS]
+    return [
+        RayConfig(columns=columns, rows=rows)
+        for columns, rows in several
+        if camera.width % columns == camera.height % rows == 0
+    ]
+
+
+def fewest_rays(places: Sequence[Place], eyes: StereoEyes, config: MissionConfig) -> tuple[RayConfig, float]:
+    """The fewest rays with which `ALIKE` of the cells are those of rendered pairs (else the most), and their share.
+
+    Args:
+      config: of the missions that see rendered pairs, with the fitted noise.
+    """
+    stereo = np.stack([fused(place, looking(config, eyes), config)[0] for place in places])
+    for rays in choices(config.camera):
+        how = with_rays(config, rays)
+        same, _ = agreement(stereo, np.stack([fused(place, looking(how, None), how)[0] for place in places]))
+        if same >= ALIKE:
+            break
+    return rays, same
 
 
 def eye(
@@ -140,11 +166,11 @@ def unmarked(arena: Arena) -> Arena:
 def sensor_toml(fit: Fit, heading: Sequence[str]) -> str:
     """A sensor file, with what each number means."""
     lines = [f"# {line}" for line in heading]
-    for name in ("stereo", "landmarks"):
+    for name in ("stereo", "landmarks", "rays"):
         part = getattr(fit.sensor, name)
         lines += ["", f"[{name}]"]
         known = part.model_dump(exclude_none=True)
-        values = {field: f"{field} = {float(value)!r}" for field, value in known.items()}
+        values = {field: f"{field} = {value if name == 'rays' else float(value)!r}" for field, value in known.items()}
         width = max(map(len, values.values())) + 2
         lines += [f"{text:<{width}}# {type(part).model_fields[field].description}" for field, text in values.items()]
     return "\n".join(lines) + "\n"

@@ -23,6 +23,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionConfig, Program, Settings, program
 from jaxbiped.mission.state import Mind, World, start
 from jaxbiped.mission.stepped import run_bare
+from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.view import View
 from jaxbiped.study.evaluate import draw
 
@@ -127,6 +128,18 @@ def fused(world: Place, look: Look, config: MissionConfig) -> tuple[Int8[np.ndar
     for number, pose in enumerate(world.poses):
         grid_map = add(grid_map, look(world, pose, number), pose, settings.body, settings.mapping, spec)
     return jax.device_get(mapping.classify(grid_map, settings.mapping, spec))
+
+
+def with_rays(config: MissionConfig, rays: RayConfig) -> MissionConfig:
+    """The same missions, but that see by so many cast rays."""
+    camera = config.camera.model_copy(update=rays.model_dump())
+    return config.model_copy(update={"sensor": "raycast", "camera": camera})
+
+
+def agreement(stereo: Int8[np.ndarray, "B H W"], ours: Int8[np.ndarray, "B H W"]) -> tuple[float, float]:
+    """Share of the cells of two sensors' maps that are the same: of all, and of those that both measured."""
+    both, equal = (stereo != Cell.UNMEASURED) & (ours != Cell.UNMEASURED), stereo == ours
+    return float(equal.mean()), float(equal[both].mean())
 
 
 add = jax.jit(mapping.update, static_argnames=("spec", "refit"))

@@ -106,10 +106,11 @@ def test_fit_sensor_writes_a_preset(scene, capsys):
     argv = ["fit-sensor", "--arenas", "2", "--views", "3", "--missions", "1", "--out", "mine.toml"]
     assert cli.main(argv) == 0
     said = capsys.readouterr().out
-    for start in ("camera", "matcher", "landmarks", "maps", "missions", "written"):
+    for start in ("camera", "matcher", "landmarks", "rays", "maps", "missions", "written"):
         assert f"\n{start}" in f"\n{said}"
     fitted = load(SensorConfig, scene.parent / "mine.toml")
     assert abs(fitted.stereo.bias) < 0.1 and 0.1 < fitted.stereo.sd < 0.2 and fitted.stereo.drop_plain < 0.15
+    assert (fitted.rays.columns, fitted.rays.rows) in ((64, 48), (64, 64), (128, 96))
     text = (scene.parent / "mine.toml").read_text()
     assert text.startswith("# Written by `jaxbiped fit-sensor --arenas 2 --views 3 --seed 1`")
     for line in text.split("[stereo]")[1].splitlines():

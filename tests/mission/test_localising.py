@@ -13,15 +13,18 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.eyes import eyes_for, view_names
 from jaxbiped.mission.localising import carried_on, localise, unmarked
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing import Motion, Sightings, View, predict
 from jaxbiped.sensing.hashing import from_key
+from jaxbiped.study.evaluate import run_all
 
 AREA = (1.8, 1.4)
 MOVED, VARIANCES = jnp.array([0.05, 0.0, 0.0]), jnp.array([1e-6, 1e-6, 1e-4])
 WAYS = "odometry", "visual", "icp", "both"
+SEEDS = 16
 
 
 def kind(way: str, **other):
@@ -138,12 +141,15 @@ def test_missions_where_nothing_can_be_seen_end(arena, sensor, way):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("way", WAYS)
-def test_missions_go_by_each_way(arena, way):
-    """The scene of experiment 1 is solved, and the robot is right about where it stands within 6 cm.
+@pytest.mark.parametrize(("way", "middle"), zip(WAYS, (0.05, 0.01, 0.03, 0.01), strict=True))
+def test_missions_go_by_each_way(arena, way, middle):
+    """Sixteen missions of experiment 1 arrive, and half of them know where they stand within `middle` [m].
 
-    Dead reckoning, and walls seen in an open arena, leave up to 7 cm in 95 % of missions: twice that is allowed.
+    `middle` is about twice the median of 300 random arenas (`sweeps/localisation.py`).
     """
     settings, static = kind(way)
-    world = run_bare(arena, settings, from_key(jax.random.key(0)), static)
-    assert world.code[0] == Code.REACHED and world.pose_error[0] < (0.15 if way in ("odometry", "icp") else 0.06)
+    batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (SEEDS, *jnp.shape(leaf))), arena)
+    noise = jnp.stack([from_key(jax.random.key(seed)) for seed in range(SEEDS)])
+    found = run_all(batch, noise, stack([settings]), SEEDS, static, lambda _: None, workers=1, slots=SEEDS)
+    assert np.all(np.asarray(found.code) == Code.REACHED)
+    assert np.median(found.pose_error) < middle

@@ -6,6 +6,7 @@ import pytest
 
 from jaxbiped import config
 from jaxbiped.errors import InputError
+from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing import PRESETS, CameraConfig, NoiseConfig, SensorConfig, sensor_preset
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -33,6 +34,18 @@ def test_fitted_sensor_says_everything():
     for part in ("stereo", "landmarks"):
         assert set(written[part]) == set(getattr(fitted, part).model_dump(exclude_none=True))
     assert abs(fitted.stereo.bias) < 0.1 and 0.1 < fitted.stereo.sd < 0.2
+
+
+def test_sensor_file_says_how_many_rays(tmp_path):
+    """In place of the camera's, unless these are given; the named presets leave the camera alone."""
+    path = tmp_path / "many.toml"
+    path.write_text("[rays]\ncolumns = 128\nrows = 96\n")
+    found = [MissionConfig(preset=str(path), **more).camera for more in ({}, {"camera": {"rows": 64, "pitch": 20.0}})]
+    assert [(camera.columns, camera.rows, camera.pitch) for camera in found] == [(128, 96, 30), (128, 64, 20)]
+    assert all(MissionConfig(preset=name).camera == CameraConfig() for name in PRESETS)
+    path.write_text("[rays]\ncolumns = 60\nrows = 48\n")
+    with pytest.raises(ValueError, match="columns must divide the width of 512"):
+        MissionConfig(preset=str(path))
 
 
 def test_camera_files():
@@ -67,6 +80,8 @@ def test_the_paper_camera():
         (NoiseConfig, {"stretch_kept": 0.5, "stretch_lost": 0.5}, "or both left out"),
         (NoiseConfig, {"stretch_kept": -1, "stretch_lost": 1}, "stretch_kept"),
         (SensorConfig, {"landmarks": {"nearest": -1}}, "landmarks.nearest"),
+        (SensorConfig, {"rays": {"columns": 2, "rows": 48}}, "rays.columns"),
+        (SensorConfig, {"rays": {"columns": 64}}, "rays.rows"),
     ],
 )
 def test_bad_values_are_named(model, data, words):
