@@ -52,6 +52,7 @@ LOST = (0.03, 0.03, np.deg2rad(3))  # [m, m, rad] by which a robot is off before
 NEAR = 1.2  # [m]
 REPEATS, AT_ONCE = 20, 2
 DRAWS = 4000
+OTHER_NOISE = 0x5BD1E995  # of another mission in the same arena
 update = jax.jit(correct)
 
 
@@ -154,17 +155,22 @@ def sensors(places, look, eyes, config, missions) -> None:
         print(f"sensors   {whose}{rays.columns} x {rays.rows} rays: {same_cells:.3f} of the fused cells are those of "
               f"stereo (wanted: 0.92), {measured:.3f} of those that both measured", flush=True)  # fmt: skip
     if missions:
-        pairs = [[mission(p, how, sees) for how, sees in ((config, eyes), (with_rays(config, fitted), None))]
-                 for p in places[:missions]]  # fmt: skip
-        alike = sum(same(*pair) for pair in pairs)
-        low, high = proportion_confint(alike, missions, method="wilson")
-        print(
-            f"missions  {alike} of {missions} end alike: {alike / missions:.0%} [{low:.0%}, {high:.0%}] (wanted: 90%)"
-        )
-        for k, pair in enumerate(pairs):
+        cast, some = with_rays(config, fitted), places[:missions]
+        seen, ours = [mission(p, config, eyes) for p in some], [mission(p, cast, None) for p in some]
+        again = [mission(replace(p, seed=p.seed ^ OTHER_NOISE), cast, None) for p in some]
+        print(f"missions  {ending_alike(seen, ours)} end alike (wanted: 90%); "
+              f"{ending_alike(ours, again)} of the ray-cast ones with other noise")  # fmt: skip
+        for k, pair in enumerate(zip(seen, ours, strict=True)):
             if not same(*pair):
                 told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
                 print(f"          arena {FIRST + k}: {told}")
+
+
+def ending_alike(first, second) -> str:
+    """How many missions end as those of another list."""
+    count, of = sum(map(same, first, second)), len(first)
+    low, high = proportion_confint(count, of, method="wilson")
+    return f"{count} of {of} ({count / of:.1%} [{low:.1%}, {high:.1%}])"
 
 
 def speed(place, eyes, config) -> None:
