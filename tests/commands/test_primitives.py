@@ -150,8 +150,6 @@ def test_what_was_optimised_is_verified_like_all_else(here, capsys):
         "--draws",
         "2",
         "--no-videos",
-        "--optimise",
-        "duration",
     ]
     assert cli.main([*command, "--optimise", "duration", "--out", "quick"]) == 0
     assert cli.main([*command, "--out", "plain"]) == 0
