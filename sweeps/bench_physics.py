@@ -10,12 +10,12 @@ bare engine (wanted: at most 10 %); in brackets the same of the processors' time
 Measured on 2 cores of x86_64 without a GPU, mujoco 4.0.0, mujoco-mjx 3.17.0, jax 0.10.2, Newton 10/20 iterations,
 impratio 10, batch 64, with little other load:
 
-    native   0 boxes   3.7 contacts        111,800 steps/s, bare 112,900: +1.0 % (+1.3 %)
-    native   4 boxes   3.7 contacts        112,400 steps/s, bare 111,700: -0.7 % (-0.3 %)
-    mjx      0 boxes   8 contact slots       5,350 steps/s, bare  5,410: +1.2 % (+2.2 %)
-    mjx      4 boxes   17 contact slots      2,810 steps/s, bare  2,930: +4.2 % (+4.8 %)
+    native   0 boxes   3.7 contacts        111,200 steps/s, bare 114,600: +3.1 % (+1.5 %)
+    native   4 boxes   3.7 contacts        110,900 steps/s, bare 112,800: +1.7 % (+1.1 %)
+    mjx      0 boxes   8 contact slots       6,300 steps/s, bare   6,330: +0.6 % (+0.5 %)
+    mjx      4 boxes   17 contact slots      3,510 steps/s, bare   3,590: +2.4 % (+2.1 %)
 
-mjx compiled in 16 to 17 s on either side. A run beside other load said +13 % of native with 4 boxes, and a minute later
+mjx compiled in 12 to 16 s, bare in 11 to 17. A run beside other load said +13 % of native with 4 boxes, and a minute later
 it was gone. Nothing was measured on a GPU.
 """
 
