@@ -15,8 +15,8 @@ impratio 10, batch 64, with little other load:
     mjx      0 boxes   8 contact slots       6,300 steps/s, bare   6,330: +0.6 % (+0.5 %)
     mjx      4 boxes   17 contact slots      3,510 steps/s, bare   3,590: +2.4 % (+2.1 %)
 
-mjx compiled in 12 to 16 s, bare in 11 to 17. A run beside other load said +13 % of native with 4 boxes, and a minute later
-it was gone. Nothing was measured on a GPU.
+mjx compiled in 12 to 16 s, bare in 11 to 17. A run beside other load said +13 % of native with 4 boxes, and a minute
+later it was gone. Nothing was measured on a GPU.
 """
 
 from __future__ import annotations
