@@ -8,9 +8,9 @@ Both sides use the whole machine, with two threads and two processes, on the sam
 is apart. The compiled side works the list of missions off several times over, as a study has many.
 
 Measured on two virtual cores of an AMD EPYC, jax 0.10.2, with little other load:
-  compiled 598 missions/s (13,500 decisions/s) against 11.0 of the reference: ratio 54, by rounds 54 to 62, 55 by CPU
-  seconds. The same code and number of decisions in all of 100 missions. 23 s of compiling.
-  A decision, each part alone: sense 28 us, map 55, plan 3, select 5, execute 4. The reference: 3.3 ms, 3.0, 1.4, and
+  compiled 666 missions/s (15,050 decisions/s) against 12.6 of the reference: ratio 53, by rounds 52 to 53, 53 by CPU
+  seconds. The same code and number of decisions in all of 100 missions. 19 s of compiling.
+  A decision, each part alone: sense 28 us, map 62, plan 4, select 6, execute 6. The reference: 3.4 ms, 2.8, 1.5, and
   0.5 for the last two.
   --stream: 2,048 arenas in shards of 1,024 peak at 2.88 GiB, 8,192 at 2.90 GiB.
   --sweep: 28 traces and 27 compilations for the first cost vector, none for the 64 that follow.

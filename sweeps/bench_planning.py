@@ -11,9 +11,9 @@ the least of several repeats, taken in turns, so that other load on the machine 
 
 Measured on 2 virtual cores of an AMD EPYC (AVX-512, 1 MiB L2 a core), jax 0.10.2, numba 0.68.1, with little other
 load; busy processes move the ratios by a third. "x" is the peer's time over ours.
-4,096 maps of 28 x 36, 3.9 us a map: 6.0x pyastar2d, 22x Dijkstra, 70x Dijkstra and its graph. 512 maps of 140 x 180,
-109 us: 3.7x, 16x, 40x. One map of 512 x 512: open 1.0x, rooms 1.2x, maze 0.67x, maze with loops 0.78x, cells thrown at
-random 1.2x. The first call compiles for 4 to 8 s, most of it in Numba.
+4,096 maps of 28 x 36, 3.1 us a map: 5.7x pyastar2d, 19x Dijkstra, 55x Dijkstra and its graph. 512 maps of 140 x 180,
+101 us: 3.1x, 15x, 40x. One map of 512 x 512: open 1.2x, rooms 1.3x, maze 0.82x, maze with loops 0.79x, cells thrown at
+random 1.1x. The first call compiles for 3 to 6 s, most of it in Numba.
 """
 
 from __future__ import annotations
