@@ -21,7 +21,6 @@ from jaxbiped.sensing.stereo.texture import textured
 from jaxbiped.sensing.view import Sightings, View
 
 STRIDE = 2  # pixels from a point to the next, across and down: a matcher's pixels hang together over more than that
-SPECKLE = 200  # [px] of clumps that are dropped: by the rim that only the left camera sees, wild ones are that large
 
 
 class StereoSensor:
@@ -33,7 +32,7 @@ class StereoSensor:
           InputError: nothing can be rendered on this machine.
         """
         self.camera, self.rig = camera, ideal(camera)
-        self.params = MatchParams(num_disparities=camera.num_disparities, speckle_size=SPECKLE)
+        self.params = MatchParams(num_disparities=camera.num_disparities)
         self.renderer = Renderer(camera)
         self.shown: bytes | None = None
 
