@@ -23,7 +23,12 @@ def check_order(left: np.ndarray, right: np.ndarray, params: MatchParams) -> Non
     pair = [cv2.resize(grey(image), shape, interpolation=cv2.INTER_AREA) for image in (left, right)]
     steps = max(int(np.ceil(params.num_disparities / small / 16)), 1) * 16
     coarse = params.model_copy(
-        update={"num_disparities": steps, "min_disparity": round(params.min_disparity / small), "mode": "3way"}
+        update={
+            "num_disparities": steps,
+            "min_disparity": round(params.min_disparity / small),
+            "mode": "3way",
+            "slanted": False,
+        }
     )
     given, swapped = (float(match(*order, coarse).valid.mean()) for order in (pair, pair[::-1]))
     if swapped > 2 * given and swapped > 2 * LEAST:
