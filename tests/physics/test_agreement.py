@@ -14,8 +14,7 @@ from jaxbiped.physics.trial import Tolerance
 from jaxbiped.physics.verify import trials
 
 ROBOT = RobotModelConfig()
-APART = 1e-3  # [m] 0.27 to 0.39 mm were measured, of soles and head
-STEP_UP = 1.5e-3  # [m] 1.38 mm were measured for a moment, of hips 0.52 mm: more than is wanted
+APART = 1e-3  # [m] of soles and head; 0.28 to 0.37 mm were measured, of the step up 0.74
 
 
 def test_backends_agree_on_getting_up():
@@ -42,8 +41,7 @@ def test_a_third_of_the_hard_cases_fails():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FIVE)
 def test_backends_agree_at_every_moment(name):
-    limit = STEP_UP if name == "step_up" else APART
-    assert paths(generate(catalogue("fast")[name], ROBOT), ROBOT).worst[0] < limit
+    assert paths(generate(catalogue("fast")[name], ROBOT), ROBOT).worst[0] < APART
 
 
 @pytest.mark.slow
