@@ -17,6 +17,9 @@ from jaxbiped.sensing.noise import LEAST_WIDTH
 from jaxbiped.sensing.stereo.semi_global import STEPS, MatchParams, agreement, search
 
 REACH = 6  # [px] of the left image to each side over which the slope of disparity is told
+TRIED = (
+    0.6  # of the first search's disparities, about those of a wall along the cameras' axis: 20 degrees to both sides
+)
 STRETCHES = 0.6, 4.0  # (`noise.stretch`) of what is kept; what faces the camera more is the first search's
 HALF = np.float32(0.5)
 WHOLE = 5  # halved pixels across and down that what is kept is made of: thinner strips are rims of other things
@@ -31,7 +34,7 @@ def search_slanted(
 
     Args:
       left, right: a rectified pair.
-      params: as of the first search; as many disparities are tried, about those of a wall along the cameras' axis.
+      params: as of the first search.
     """
     value, valid = np.zeros(left.shape, np.float32), np.zeros(left.shape, bool)
     high, wide = left.shape[0] // 2, left.shape[1] // 2
@@ -51,7 +54,7 @@ Found = tuple[slice, Float32[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]  # col
 
 def rising(left: UInt8[np.ndarray, "H W"], right: UInt8[np.ndarray, "H W"], params: MatchParams) -> Found:
     """Disparities that rise to the right: the left image is the wider one."""
-    wide, tried = left.shape[1] // 2, params.num_disparities
+    wide, tried = left.shape[1] // 2, columns_tried(params)
     narrow, padded, other, shift = halves(left, right, tried, -params.min_disparity)
     raw = search(padded, other, params.model_copy(update={"min_disparity": 1 - tried, "speckle_size": 0}))[:, :wide]
     column = np.arange(wide, dtype=np.float32)
@@ -67,7 +70,7 @@ def rising(left: UInt8[np.ndarray, "H W"], right: UInt8[np.ndarray, "H W"], para
 
 def falling(left: UInt8[np.ndarray, "H W"], right: UInt8[np.ndarray, "H W"], params: MatchParams) -> Found:
     """Disparities that fall to the right: the right image is the wider one."""
-    wide, tried = left.shape[1] // 2, params.num_disparities
+    wide, tried = left.shape[1] // 2, columns_tried(params)
     narrow, padded, other, shift = halves(right, left, tried, params.min_disparity // 2)
     raw = search(other, padded, params.model_copy(update={"min_disparity": 0, "speckle_size": 0}))
     column = np.arange(other.shape[1], dtype=np.float32)
@@ -79,6 +82,11 @@ def falling(left: UInt8[np.ndarray, "H W"], right: UInt8[np.ndarray, "H W"], par
     valid = whole(even & within(-slope), 2 * WHOLE)
     first, last = max(shift, 0), min(shift + other.shape[1], left.shape[1])
     return slice(first, last), disparity[:, first - shift : last - shift], valid[:, first - shift : last - shift]
+
+
+def columns_tried(params: MatchParams) -> int:
+    """How many matches are tried for each column; a multiple of 16."""
+    return max(int(TRIED * params.num_disparities) // 16, 1) * 16
 
 
 def halves(wider: UInt8[np.ndarray, "H W"], other: UInt8[np.ndarray, "H W"], tried: int, offset: int):
