@@ -26,8 +26,9 @@ class MapConfig(Model):
     """a voxel with fewer points is empty, in one view and in the fused evidence"""
     voxel_share: float = Field(0.05, ge=0, lt=1)
     """a voxel with a smaller share of the points of one right above or below is empty: noise leaked out of that one"""
-    solid_points: float = Field(150.0, ge=0)
-    """a patch of 5 x 5 cm of one level with fewer points bars no way: it may be a phantom, a clump of wild disparity"""
+    solid_points: float = Field(144.0, ge=0)
+    """a patch of 5 x 5 cm of one level with fewer points bars no way: it may be a phantom, a clump of wild disparity;
+    three rays of 64 x 64"""
     below_points: float | None = Field(None, ge=0)
     """fewer will do in a voxel that hangs without a gap below one that bars the way: the foot of a wall further off,
     which else would be taken for a gate where only its upper levels have points enough; by default none will (but 50 of
