@@ -161,10 +161,17 @@ def mission(world: Place, config: MissionConfig, eyes: Eyes | None) -> Outcome:
     return Outcome(Code(int(end.code[0])), float(end.distance[0]), float(end.time[0]))
 
 
-def same(one: Outcome, other: Outcome) -> bool:
-    """Whether two missions ended alike: the same code, and distance and time within `RATIO`."""
-    close = (abs(a - b) <= RATIO * max(a, b) for a, b in ((one.distance, other.distance), (one.time, other.time)))
-    return one.code == other.code and all(close)
+def same(one: Outcome, other: Outcome, lost: bool = False) -> bool:
+    """Whether two missions ended alike: the same code, and distance and time within `RATIO`.
+
+    Of missions that did not reach their goal neither is a result, and the code is all that is asked.
+
+    Args:
+      lost: compare how far these came, and when they gave up, as well.
+    """
+    if one.code != other.code or (one.code != Code.REACHED and not lost):
+        return one.code == other.code
+    return all(abs(a - b) <= RATIO * max(a, b) for a, b in ((one.distance, other.distance), (one.time, other.time)))
 
 
 @dataclass(frozen=True)

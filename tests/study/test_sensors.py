@@ -1,0 +1,29 @@
+"""When two missions count as ended alike."""
+
+import pytest
+
+from jaxbiped.mission.outcome import Code
+from jaxbiped.study.sensors import Outcome, same
+
+REACHED = Outcome(Code.REACHED, 1.0, 600.0)
+
+
+@pytest.mark.parametrize(
+    ("other", "alike"),
+    [
+        (Outcome(Code.REACHED, 1.0, 600.0), True),
+        (Outcome(Code.REACHED, 1.1, 545.0), True),
+        (Outcome(Code.REACHED, 1.12, 600.0), False),
+        (Outcome(Code.REACHED, 1.0, 530.0), False),
+        (Outcome(Code.COLLIDED, 1.0, 600.0), False),
+    ],
+)
+@pytest.mark.parametrize("lost", [False, True])
+def test_of_what_reached_its_goal_distance_and_time_count(other, alike, lost):
+    assert same(REACHED, other, lost) == same(other, REACHED, lost) == alike
+
+
+def test_what_did_not_has_no_result_but_its_code():
+    one, other = Outcome(Code.NO_PATH, 0.0, 70.0), Outcome(Code.NO_PATH, 0.05, 108.0)
+    assert same(one, other) and not same(one, other, lost=True)
+    assert not same(one, Outcome(Code.STUCK, 0.0, 70.0))
