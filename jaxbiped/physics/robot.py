@@ -13,8 +13,8 @@ TIMESTEP = 0.005  # [s]: at 16 ms it slips or falls
 SOLVER = {"iterations": 10, "ls_iterations": 20, "impratio": 10.0}
 """Enough iterations that more change nothing; impratio 10 keeps soft contacts from creeping (with 4 and 6 it falls)."""
 MARGIN = 0.0001  # [m] early contact of the feet: without it all but one contact of a foot on a box come and go, and in
-# the 25 s that a slow step down stands on one foot it turns by 4 degrees; with it, or with half of it, by 0.01. No more,
-# since in MJX it is size (`engine.grow`), and an edge bears the foot so much sooner.
+# the 25 s that a slow step down stands on one foot it turns by 4 degrees; with it, or half of it, by 0.01. No more:
+# in MJX it is size (`engine.grow`), and an edge bears the foot so much sooner.
 FAR = 100.0  # [m] below the ground where unused boxes lie
 FEET, UPPER = 1, 2  # contact bits: feet meet floor and boxes, torso and head meet boxes, the robot never itself
 AXES = {"yaw": (0, 0, 1), "roll": (1, 0, 0), "pitch": (0, 1, 0)}

@@ -12,6 +12,8 @@ from jaxbiped.errors import InputError
 from jaxbiped.sensing.stereo.semi_global import STEPS, MatchParams, agreement, search
 from jaxbiped.sensing.stereo.slanted import search_slanted
 
+SHARPER = 5.0  # [px] up to which the second search, more exact where it finds something, corrects the first
+
 
 @dataclass(frozen=True)
 class Disparity:
@@ -48,6 +50,7 @@ def match(left: np.ndarray, right: np.ndarray, params: MatchParams | None = None
         valid &= agreement(left, right, column, params.agreement_window) >= params.agreement
     if params.slanted:
         beside, there = search_slanted(left, right, params)
+        there &= ~valid | (np.abs(beside - value) < SHARPER)
         value, valid = np.where(there, beside, value), valid | there
     if params.speckle_size:
         found = np.where(valid, np.rint(value * STEPS), highest).astype(np.int16)
