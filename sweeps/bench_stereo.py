@@ -158,19 +158,18 @@ def sensors(places, look, eyes, config, missions) -> None:
         cast, some = with_rays(config, fitted), places[:missions]
         seen, ours = [mission(p, config, eyes) for p in some], [mission(p, cast, None) for p in some]
         again = [mission(replace(p, seed=p.seed ^ OTHER_NOISE), cast, None) for p in some]
-        print(f"missions  {ending_alike(seen, ours)} end alike (wanted: 90%): the same code, and of those that reach "
-              "the goal distance and time within 10 %")  # fmt: skip
-        print(f"          {ending_alike(seen, ours, lost=True)} if how far the others came, and when they gave up, is "
-              "compared as well")  # fmt: skip
+        print(f"missions  {ending_alike(seen, ours)} end alike (wanted: 90%): code, distance and time")  # fmt: skip
+        print(f"          {ending_alike(seen, ours, lost=False)} if distance and time count only of those that "
+              "reach the goal")  # fmt: skip
         print(f"          {ending_alike(ours, again)} of the ray-cast ones as themselves with other noise; "
-              f"{ending_alike(ours, again, lost=True)}")  # fmt: skip
+              f"{ending_alike(ours, again, lost=False)}")  # fmt: skip
         for k, pair in enumerate(zip(seen, ours, strict=True)):
-            if not same(*pair, lost=True):
+            if not same(*pair):
                 told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
                 print(f"          arena {FIRST + k}: {told}")
 
 
-def ending_alike(first, second, lost: bool = False) -> str:
+def ending_alike(first, second, lost: bool = True) -> str:
     """How many missions end as those of another list."""
     count, of = sum(same(*pair, lost) for pair in zip(first, second, strict=True)), len(first)
     low, high = proportion_confint(count, of, method="wilson")

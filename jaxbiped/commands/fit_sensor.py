@@ -121,8 +121,7 @@ def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, foun
         pairs = [(mission(place, rendered, eyes), mission(place, fitted, None)) for place in
                  track(places[:missions], description="missions", console=show, transient=True)]  # fmt: skip
         alike = sum(same(*pair) for pair in pairs)
-        print(f"missions   {alike} of {len(pairs)} ended alike (code; of those that reached the goal, distance and "
-              "time within 10 %)")  # fmt: skip
+        print(f"missions   {alike} of {len(pairs)} ended alike (code, and distance and time within 10 %)")
         for k, pair in enumerate(pairs):
             if not same(*pair):
                 told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)

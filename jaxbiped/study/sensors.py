@@ -161,13 +161,12 @@ def mission(world: Place, config: MissionConfig, eyes: Eyes | None) -> Outcome:
     return Outcome(Code(int(end.code[0])), float(end.distance[0]), float(end.time[0]))
 
 
-def same(one: Outcome, other: Outcome, lost: bool = False) -> bool:
+def same(one: Outcome, other: Outcome, lost: bool = True) -> bool:
     """Whether two missions ended alike: the same code, and distance and time within `RATIO`.
 
-    Of missions that did not reach their goal neither is a result, and the code is all that is asked.
-
     Args:
-      lost: compare how far these came, and when they gave up, as well.
+      lost: compare also how far missions came that did not reach their goal, and when they gave up; else their code is
+        all that is asked.
     """
     if one.code != other.code or (one.code != Code.REACHED and not lost):
         return one.code == other.code

@@ -23,7 +23,7 @@ def test_of_what_reached_its_goal_distance_and_time_count(other, alike, lost):
     assert same(REACHED, other, lost) == same(other, REACHED, lost) == alike
 
 
-def test_what_did_not_has_no_result_but_its_code():
+def test_what_did_not_may_be_asked_for_its_code_alone():
     one, other = Outcome(Code.NO_PATH, 0.0, 70.0), Outcome(Code.NO_PATH, 0.05, 108.0)
-    assert same(one, other) and not same(one, other, lost=True)
-    assert not same(one, Outcome(Code.STUCK, 0.0, 70.0))
+    assert same(one, other, lost=False) and not same(one, other)
+    assert not same(one, Outcome(Code.STUCK, 0.0, 70.0), lost=False)
