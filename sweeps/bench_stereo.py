@@ -14,6 +14,7 @@ import argparse
 import contextlib
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,6 +35,7 @@ from jaxbiped.sensing.stereo.fit import quality, together
 from jaxbiped.study.fitting import choices, eye, least_contrast, unmarked, watch_from
 from jaxbiped.study.sensors import (
     AREA,
+    Outcome,
     agreement,
     around,
     fused,
@@ -144,8 +146,8 @@ def poses(places, eyes, config) -> None:
           f"(wanted: 3, 0.3), 95 % within {most[0]:.1f} mm {most[1]:.2f} deg (15, 1.5)")  # fmt: skip
 
 
-def sensors(places, look, eyes, config, missions) -> None:
-    """The ray-cast sensor with the preset in the same places, and in whole missions."""
+def sensors(places, look, config) -> None:
+    """The ray-cast sensor with the preset in the same places."""
     fitted = RayConfig(columns=config.camera.columns, rows=config.camera.rows)
     stereo = np.stack([fused(place, look, config)[0] for place in places])
     for rays in (fitted, *(few for few in choices(CameraConfig()) if few != fitted)):
@@ -154,19 +156,36 @@ def sensors(places, look, eyes, config, missions) -> None:
         whose = "the preset's " if rays == fitted else ""
         print(f"sensors   {whose}{rays.columns} x {rays.rows} rays: {same_cells:.3f} of the fused cells are those of "
               f"stereo (wanted: 0.92), {measured:.3f} of those that both measured", flush=True)  # fmt: skip
-    if missions:
-        cast, some = with_rays(config, fitted), places[:missions]
-        seen, ours = [mission(p, config, eyes) for p in some], [mission(p, cast, None) for p in some]
-        again = [mission(replace(p, seed=p.seed ^ OTHER_NOISE), cast, None) for p in some]
-        print(f"missions  {ending_alike(seen, ours)} end alike (wanted: 90%): code, distance and time")  # fmt: skip
-        print(f"          {ending_alike(seen, ours, lost=False)} if distance and time count only of those that "
-              "reach the goal")  # fmt: skip
-        print(f"          {ending_alike(ours, again)} of the ray-cast ones as themselves with other noise; "
-              f"{ending_alike(ours, again, lost=False)}")  # fmt: skip
-        for k, pair in enumerate(zip(seen, ours, strict=True)):
-            if not same(*pair):
-                told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
-                print(f"          arena {FIRST + k}: {told}")
+
+
+def missions(places, config) -> None:
+    """Whole missions with rendered pairs, with the ray-cast sensor, and with that and other noise."""
+    cast = with_rays(config, RayConfig(columns=config.camera.columns, rows=config.camera.rows))
+    seen, ours = by_pictures(places, config), [mission(p, cast, None) for p in places]
+    again = [mission(replace(p, seed=p.seed ^ OTHER_NOISE), cast, None) for p in places]
+    print(f"missions  {ending_alike(seen, ours)} end alike (wanted: 90%): code, distance and time")
+    print(f"          {ending_alike(seen, ours, lost=False)} if distance and time count only of those that "
+          "reach the goal")  # fmt: skip
+    print(f"          {ending_alike(ours, again)} of the ray-cast ones as themselves with other noise; "
+          f"{ending_alike(ours, again, lost=False)}")  # fmt: skip
+    for k, pair in enumerate(zip(seen, ours, strict=True)):
+        if not same(*pair):
+            told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
+            print(f"          arena {FIRST + k}: {told}")
+
+
+def by_pictures(places, config) -> list[Outcome]:
+    """Missions with rendered pairs, `AT_ONCE` of them at once: a thread each, and what it renders with."""
+
+    def every(first: int) -> list[Outcome]:
+        with contextlib.closing(StereoEyes(config.camera)) as eyes:
+            return [mission(place, config, eyes) for place in places[first::AT_ONCE]]
+
+    ended: list = [None] * len(places)
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for first, those in enumerate(pool.map(every, range(AT_ONCE))):
+            ended[first::AT_ONCE] = those
+    return ended
 
 
 def ending_alike(first, second, lost: bool = True) -> str:
@@ -242,21 +261,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--arenas", type=int, default=36, help="random arenas")
     parser.add_argument("--views", type=int, default=10, help="views of each")
-    parser.add_argument("--missions", type=int, default=0, help="missions of both sensors, at most one an arena")
+    parser.add_argument("--missions", type=int, default=0, help="missions of both sensors, an arena each")
     parser.add_argument(
         "--preset", default=PRESET, help="sensor file of the ray-cast sensor; what both expect of landmarks"
     )
     options = parser.parse_args()
     config = MissionConfig(sensor="stereo", preset=str(options.preset))
     with contextlib.closing(StereoEyes(config.camera)) as eyes:
-        places = list(worlds(SEED, FIRST, options.arenas, options.views, config))
+        every = list(worlds(SEED, FIRST, max(options.arenas, options.missions), options.views, config))
+        places = every[: options.arenas]
         speed(places[0], eyes, config)
         flight(places[:AT_ONCE], config)
         look = remembered(looking(config, eyes))
         maps(places, look, config)
         matcher(places, eyes, config)
         poses(places, eyes, config)
-        sensors(places, look, eyes, config, min(options.missions, len(places)))
+        sensors(places, look, config)
+    if options.missions:
+        missions(every[: options.missions], config)
 
 
 if __name__ == "__main__":

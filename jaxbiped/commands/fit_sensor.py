@@ -87,7 +87,7 @@ def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
         f"median; sd {1e3 * marks.sd:.1f} mm + {1e3 * marks.sd_per_metre:.1f} mm/m; discs to "
         f"{marks.furthest_circle:.2f} m, squares to {marks.furthest_square:.2f} m",
         f"rays       {cast.columns} x {cast.rows}: {found.same:.1%} of these arenas' cells are those of stereo "
-        f"(wanted: {ALIKE:.0%})",
+        f"(wanted: {ALIKE:.1%})",
     ]
 
 
