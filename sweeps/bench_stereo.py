@@ -1,6 +1,6 @@
 """Rendered stereo: what it measures, maps and locates, how close the ray-cast sensor comes to it, and how fast it is.
 
-    python sweeps/bench_stereo.py [--arenas 36] [--views 10] [--missions 0] [--preset configs/sensors/stereo.toml]
+    python sweeps/bench_stereo.py [--arenas 36] [--first 1000] [--views 10] [--missions 0] [--preset FILE]
 
 Each line gives what is wanted after what was measured. Arenas are random ones of all families that no preset and no
 threshold was fitted to; views are aimed at gates, bumps and obstacles from 25 to 80 cm. Intervals are at 95 %: of gates
@@ -158,8 +158,12 @@ def sensors(places, look, config) -> None:
               f"stereo (wanted: 0.92), {measured:.3f} of those that both measured", flush=True)  # fmt: skip
 
 
-def missions(places, config) -> None:
-    """Whole missions with rendered pairs, with the ray-cast sensor, and with that and other noise."""
+def missions(places, config, first: int) -> None:
+    """Whole missions with rendered pairs, with the ray-cast sensor, and with that and other noise.
+
+    Args:
+      first: number of the first arena.
+    """
     cast = with_rays(config, RayConfig(columns=config.camera.columns, rows=config.camera.rows))
     seen, ours = by_pictures(places, config), [mission(p, cast, None) for p in places]
     again = [mission(replace(p, seed=p.seed ^ OTHER_NOISE), cast, None) for p in places]
@@ -171,7 +175,7 @@ def missions(places, config) -> None:
     for k, pair in enumerate(zip(seen, ours, strict=True)):
         if not same(*pair):
             told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
-            print(f"          arena {FIRST + k}: {told}")
+            print(f"          arena {first + k}: {told}")
 
 
 def by_pictures(places, config) -> list[Outcome]:
@@ -260,6 +264,7 @@ def flight(places, config) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--arenas", type=int, default=36, help="random arenas")
+    parser.add_argument("--first", type=int, default=FIRST, help="number of the first of them")
     parser.add_argument("--views", type=int, default=10, help="views of each")
     parser.add_argument("--missions", type=int, default=0, help="missions of both sensors, an arena each")
     parser.add_argument(
@@ -268,7 +273,7 @@ def main() -> None:
     options = parser.parse_args()
     config = MissionConfig(sensor="stereo", preset=str(options.preset))
     with contextlib.closing(StereoEyes(config.camera)) as eyes:
-        every = list(worlds(SEED, FIRST, max(options.arenas, options.missions), options.views, config))
+        every = list(worlds(SEED, options.first, max(options.arenas, options.missions), options.views, config))
         places = every[: options.arenas]
         speed(places[0], eyes, config)
         flight(places[:AT_ONCE], config)
@@ -278,7 +283,7 @@ def main() -> None:
         poses(places, eyes, config)
         sensors(places, look, config)
     if options.missions:
-        missions(every[: options.missions], config)
+        missions(every[: options.missions], config, options.first)
 
 
 if __name__ == "__main__":
