@@ -53,7 +53,7 @@ class VisualConfig(Model):
     """[deg] of the angle turned."""
     least_share: float = Field(0.02, ge=0, le=1)
     """Share of the pixels of the image that both views must measure; with less, nothing is found."""
-    failure: float = Field(0.04, ge=0, le=1)
+    failure: float = Field(0.05, ge=0, le=1)
     """Chance that nothing is found where there is enough."""
 
     def traced(self) -> VisualNoise:
