@@ -10,12 +10,12 @@ bare engine (wanted: at most 10 %); in brackets the same of the processors' time
 Measured on 2 cores of x86_64 without a GPU, mujoco 4.0.0, mujoco-mjx 3.17.0, jax 0.10.2, Newton 10/20 iterations,
 impratio 10, batch 64, with little other load:
 
-    native   0 boxes   3.7 contacts        111,200 steps/s, bare 114,600: +3.1 % (+1.5 %)
-    native   4 boxes   3.7 contacts        110,900 steps/s, bare 112,800: +1.7 % (+1.1 %)
-    mjx      0 boxes   8 contact slots       6,300 steps/s, bare   6,330: +0.6 % (+0.5 %)
-    mjx      4 boxes   17 contact slots      3,510 steps/s, bare   3,590: +2.4 % (+2.1 %)
+    native   0 boxes   3.8 contacts        111,300 steps/s, bare 113,000: +1.5 % (+1.9 %)
+    native   4 boxes   3.8 contacts        111,600 steps/s, bare 113,200: +1.4 % (+1.0 %)
+    mjx      0 boxes   8 contact slots       5,760 steps/s, bare   6,060: +5.1 % (+6.4 %)
+    mjx      4 boxes   17 contact slots      3,530 steps/s, bare   3,490: -1.2 % (-2.5 %)
 
-mjx compiled in 12 to 16 s, bare in 11 to 17. A run beside other load said +13 % of native with 4 boxes, and a minute
+mjx compiled in 12 to 17 s, bare in 12 to 16. A run beside other load said +13 % of native with 4 boxes, and a minute
 later it was gone. Nothing was measured on a GPU.
 """
 
