@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, Int8
 
+from jaxbiped.core.batching import unfold
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning.arguments import grid_arguments
 
 # (di, dj) of the eight moves; row i is along y and column j along x, so that direction k heads for k * 45 deg
 DIRECTIONS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
@@ -54,10 +57,14 @@ LEVEL, IN_GATE, STEP, UNMEASURED, FORBIDDEN = range(5)
 
 
 def cell_kinds(classes: Int[Array, "*S"], rules: Rules) -> Int8[Array, "*S"]:
-    """What a cell makes of the moves that touch it; the leaves of `rules` broadcast from the right."""
+    """What a cell makes of the moves that touch it; the leaves of `rules` broadcast from the right.
+
+    What is no class is an obstacle.
+    """
     bump = (classes == Cell.BUMP) & ~jnp.asarray(rules.bumps)
     gate = classes == Cell.GATE
-    blocked = (classes == Cell.OBSTACLE) | bump | (gate & ~jnp.asarray(rules.gates))
+    solid = (classes < 0) | (classes >= Cell.OBSTACLE)
+    blocked = solid | bump | (gate & ~jnp.asarray(rules.gates))
     kind = jnp.where(blocked, FORBIDDEN, jnp.where(classes == Cell.UNMEASURED, UNMEASURED, jnp.where(gate, IN_GATE, 0)))
     return kind.astype(jnp.int8)
 
@@ -121,25 +128,33 @@ def half_edges(
     return tuple(edges(k) for k in range(4))
 
 
-@jax.jit
 def edge_costs(
-    classes: Int[Array | np.ndarray, "B H W"],
-    levels: Int[Array | np.ndarray, "B H W"],
-    costs: Costs | None = None,
-    rules: Rules | None = None,
-) -> Float[Array, "B 8 H W"]:
+    classes: Any, levels: Any, costs: Costs | None = None, rules: Rules | None = None
+) -> Float[Array, "*B 8 H W"]:
     """Cost of leaving each cell in each of `DIRECTIONS`, inf where that is forbidden (paper, Eq. 1 and 2.3).
 
+    Leading axes broadcast. May be called inside `jit`, `vmap` and `grad`.
+
     Args:
-      classes: a `mapping.grid.Cell` each.
-      levels: height of each cell's ground in steps; ends more than one step apart are not joined. That of an
-        unmeasured cell is not known, and not read.
-      costs, rules: scalars or [B] leaves; the paper's by default.
+      classes: [*B, H, W], integers, a `mapping.grid.Cell` each; any other value in a traced grid is an obstacle.
+      levels: [*B, H, W], integers, height of each cell's ground in steps, from -128 to 127; ends more than one step
+        apart are not joined. That of an unmeasured cell is not known, and not read. In a traced grid a cell with a
+        level beyond that is an obstacle.
+      costs, rules: leaves [*B]; the paper's by default.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
 
     Deviation: the paper says nothing of oblique moves past the corner of an obstacle; `Rules.corner_cutting`.
     """
+    batch, inputs = grid_arguments(classes, levels, costs or Costs(), rules or Rules())
+    return unfold(_edge_costs(*inputs), batch)
+
+
+@jax.jit
+def _edge_costs(classes, levels, costs: Costs, rules: Rules) -> Float[Array, "B 8 H W"]:
     last = (jnp.moveaxis(jnp.asarray(a), 0, -1) for a in (classes, levels))
-    half = half_edges(*last, costs or Costs(), rules or Rules())
+    half = half_edges(*last, costs, rules)
     height, width = classes.shape[1:]
     back = [(1, 1)] * 4 + [(1 + int(di), 1 + int(dj)) for di, dj in DIRECTIONS[4:]]
     out = [half[k % 4][i : i + height, j : j + width] for k, (i, j) in enumerate(back)]

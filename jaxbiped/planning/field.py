@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -14,17 +16,20 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.core.batching import fold, folding_vmap, unfold, without_gradient
+from jaxbiped.core.checks import cells, leading_shape, reals
 from jaxbiped.devices import by_rows, mesh_of
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled, wavefront
+from jaxbiped.planning.arguments import are_classes, grid_arguments
 from jaxbiped.planning.costs import Costs, Rules, half_edges, tables
 
 METHODS = ("wavefront", *compiled.METHODS)
-# arenas settled together, of small and of large grids: what fits the cache
-CHUNK, CHUNK_LARGE = compiled.LANES, compiled.LANES_LARGE
+CHUNK = compiled.LANES  # arenas settled together: what fits the cache
 PIECES = 4  # for each core, so that a slow piece does not leave the other cores idle
-LARGE = 1200  # cells; larger grids are summed in float64 (see `_solve`)
-HUGE, FEW = 1 << 17, 4  # cells from which on, and large grids at once below which, cells are settled one by one
+LARGE, FEW = 1200, 4  # cells of a large grid; fewer of these at once are settled one by one,
+HUGE = 1 << 17  # as grids of more cells than that are, however many there are
+NO_GRADIENT = "a field has no gradient: differentiate `planning.path_cost`, the cost of the best path from a start"
 
 
 @jax.tree_util.register_dataclass
@@ -32,46 +37,73 @@ HUGE, FEW = 1 << 17, 4  # cells from which on, and large grids at once below whi
 class CostToGo:
     """Least cost from each cell to the goal."""
 
-    cost: Float[Array, "B H W"]  # inf: no way, or not converged
-    iterations: Int[Array, "B"]  # rounds of relaxation until nothing changed; 1 with "dijkstra"
-    converged: Bool[Array, "B"]  # False: costs that are NaN or negative
+    cost: Float[Array, "*B H W"]  # inf: no way, or not converged
+    iterations: Int[Array, "*B"]  # rounds of relaxation until nothing changed; 1 with "dijkstra"
+    converged: Bool[Array, "*B"]  # whether the costs are exact: one more relaxation, which was made, lowers none
 
 
-def cost_to_go(
-    edge_costs: Float[Array | np.ndarray, "B 8 H W"], goal_ij: Int[Array | np.ndarray, "B 2"], method: str = "auto"
-) -> CostToGo:
+def cost_to_go(edge_costs: Any, goal_ij: Any, method: str = "auto") -> CostToGo:
     """Least cost from each cell to `goal_ij` over `edge_costs` (what leaving a cell in each direction costs).
 
+    Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`. There is no gradient (see `path_cost`).
+
     Args:
-      edge_costs: non-negative; zero and inf are allowed. An arena with a NaN or a negative one does not converge.
-      goal_ij: row and column; a goal outside the grid is reached from nowhere.
+      edge_costs: [*B, 8, H, W], float32; zero and inf are allowed. An arena with a NaN or a negative one does not
+        converge, and its costs are inf. Moves out of the grid are not made, whatever they cost.
+      goal_ij: [*B, 2], integers, row and column; a goal outside the grid is reached from nowhere.
       method: "wavefront" (any device), "line_sweep" or "dijkstra" (CPU), or "auto": line sweeps on a CPU, Dijkstra
         there for huge grids and for few large ones, the wavefront elsewhere.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype; a method that this device does not have.
     """
-    return _on_all_cores(_cost_to_go, (edge_costs, goal_ij), _method(method, edge_costs))
+    edges, goal_ij = reals("edge_costs", edge_costs, "8 H W"), cells("goal_ij", goal_ij)
+    batch = leading_shape(edge_costs=(edges, "8 H W"), goal_ij=(goal_ij, "2"))
+    inputs = fold(edges, batch, 3), fold(goal_ij, batch, 1)
+    return unfold(_on_all_cores(_cost_to_go, inputs, _method(method, inputs[0])), batch)
 
 
 def field(
-    classes: Int[Array | np.ndarray, "B H W"],
-    levels: Int[Array | np.ndarray, "B H W"],
+    classes: Any,
+    levels: Any,
     costs: Costs | None = None,
     rules: Rules | None = None,
-    goal_ij: Int[Array | np.ndarray, "B 2"] | None = None,
+    goal_ij: Any = None,
     method: str = "auto",
     devices: Sequence[jax.Device] | None = None,
 ) -> CostToGo:
     """`cost_to_go` of `edge_costs`, without ever holding all edge costs: the fast path.
 
-    Arguments as there. May be called inside jit, where its chunks run one after the other; called from outside
-    on a CPU they go to all cores. An arena's result does not depend on the others of its batch.
+    Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`, where its chunks run one after the other;
+    called from outside on a CPU they go to all cores. An arena's result does not depend on the others of its batch.
+    There is no gradient (see `path_cost`).
 
     Args:
+      classes: [*B, H, W], integers, a `Cell` each. Traced grids with another value do not converge: their costs are
+        inf.
+      levels: [*B, H, W], integers, height of each cell's ground in steps, from -128 to 127; not read where a cell is
+        unmeasured or an obstacle. Traced grids with a level beyond that do not converge.
+      costs, rules: leaves [*B]; the paper's by default. An arena with a cost that is NaN or negative does not converge.
+      goal_ij: [*B, 2], integers, row and column; a goal outside the grid is reached from nowhere.
+      method: as of `cost_to_go`.
       devices: called from outside, they share the batch; by default all of this process where they are no CPU.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known; a
+        method that this device does not have.
     """
     if goal_ij is None:
         raise InputError("must be given", field="goal_ij")
-    each = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, classes.shape[:1]), (costs or Costs(), rules or Rules()))
-    return _on_all_cores(_field, (classes, levels, each, goal_ij), _method(method, classes), devices)
+    given = grid_arguments(classes, levels, costs or Costs(), rules or Rules(), goal_ij=goal_ij)
+    batch, (classes, levels, costs, rules, goal_ij) = given
+    inputs = classes, levels, (costs, rules), goal_ij
+    return unfold(_on_all_cores(_field, inputs, _method(method, classes), devices), batch)
+
+
+@cache
+def _differentiated(solve, method: str):
+    """`solve(inputs, method)` as a function of `inputs` that `vmap` and `grad` know what to do with."""
+    return without_gradient(folding_vmap(lambda inputs: solve(inputs, method)), NO_GRADIENT)
 
 
 @partial(jax.jit, static_argnums=1)
@@ -82,7 +114,7 @@ def _cost_to_go(inputs, method: str) -> CostToGo:
         last = jnp.pad(jnp.moveaxis(edges, 0, -1), ((0, 0), (1, 1), (1, 1), (0, 0)), constant_values=jnp.inf)
         return _solve(tuple(last), goal, method, valid)
 
-    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
+    return _by_chunks(chunk, inputs)
 
 
 @partial(jax.jit, static_argnums=1)
@@ -94,18 +126,19 @@ def _field(inputs, method: str) -> CostToGo:
         costs, rules = each
         costs, valid = _checked(costs)
         last = (jnp.moveaxis(a, 0, -1) for a in (classes, levels))
-        return _solve(half_edges(*last, costs, rules), goal, method, valid)
+        return _solve(half_edges(*last, costs, rules), goal, method, valid & are_classes(classes))
 
-    return _by_chunks(chunk, inputs, _is_large(inputs[0]))
+    return _by_chunks(chunk, inputs)
 
 
 def _from_grids(classes, levels, each, goal_ij) -> CostToGo:
     """Line sweeps, for which the kernel itself prices the edges of a few arenas at a time."""
     read, valid = _tables(each)
-    goal_ij, double = jnp.where(valid[:, None], goal_ij, -1), _is_large(classes)
-    with jax.enable_x64(double):
-        cost, steps = compiled.settle_grids(read, _bytes(classes), _bytes(levels), goal_ij, double)
-        return CostToGo(cost, steps, valid)
+    valid &= are_classes(classes)
+    goal_ij = jnp.where(valid[:, None], goal_ij, -1)
+    with jax.enable_x64(True):
+        cost, steps, settled = compiled.settle_grids(read, classes, levels, goal_ij)
+        return CostToGo(cost, steps, valid & settled)
 
 
 @jax.jit
@@ -113,11 +146,6 @@ def _tables(each):
     """`tables` of costs and rules, and which costs are valid."""
     costs, valid = _checked(each[0])
     return tables(costs, each[1]), valid
-
-
-def _bytes(grids):
-    """Classes or levels as int8; those beyond it are taken for its ends."""
-    return grids if grids.dtype == np.int8 else grids.clip(-128, 127).astype(np.int8)
 
 
 def _checked(costs: Costs):
@@ -139,76 +167,74 @@ def _method(name: str, grids) -> str:
         return name
     if not on_cpu:
         return "wavefront"
-    cells = grids.shape[-2] * grids.shape[-1]
-    return "dijkstra" if cells > HUGE or (_is_large(grids) and grids.shape[0] < FEW) else "line_sweep"
+    size = grids.shape[-2] * grids.shape[-1]
+    return "dijkstra" if size > HUGE or (size > LARGE and grids.shape[0] < FEW) else "line_sweep"
 
 
 def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
     """`solve` on pieces of the batch: on devices, or from as many threads as a CPU has cores, if that is any use."""
-    batch, chunk = inputs[0].shape[0], CHUNK_LARGE if _is_large(inputs[0]) else CHUNK
+    batch, grid = inputs[0].shape[0], inputs[0].shape[-2:]
+    if batch * math.prod(grid) == 0:
+        return CostToGo(jnp.zeros((batch, *grid)), jnp.zeros(batch, jnp.int32), jnp.ones(batch, bool))
     traced = any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(inputs))
     if not traced and devices is None and jax.default_backend() != "cpu" and jax.local_device_count() > 1:
         devices = jax.local_devices()
-    if devices and not traced and batch:
+    if devices and not traced:
         return by_rows(solve, mesh_of(devices), method=method)(inputs)
-    if traced or batch <= chunk or jax.default_backend() != "cpu":
+    if traced:
+        return _differentiated(solve, method)(jax.tree.map(jnp.asarray, inputs))
+    if batch <= CHUNK or jax.default_backend() != "cpu":
         return solve(jax.tree.map(jnp.asarray, inputs), method)
-    size = min(batch, chunk * -(-batch // (chunk * PIECES * (os.cpu_count() or 1))))
-    shape = inputs[0].shape[:1] + inputs[0].shape[-2:]
-    out = CostToGo(compiled.aligned(shape, np.float32), np.empty(batch, np.int32), np.empty(batch, bool))
+    size = min(batch, CHUNK * -(-batch // (CHUNK * PIECES * (os.cpu_count() or 1))))
+    out = CostToGo(compiled.aligned((batch, *grid), np.float32), np.empty(batch, np.int32), np.empty(batch, bool))
     direct = solve is _field and method == "line_sweep"
-    inputs = _prepared(inputs, out) if direct else jax.tree.map(np.asarray, inputs)
+    inputs, valid = _prepared(inputs) if direct else (jax.tree.map(np.asarray, inputs), True)
 
     def piece(start):
         stop = min(start + size, batch)
         rows = slice(stop - size, stop)  # the last one overlaps the one before: one program
         part = jax.tree.map(lambda a: a[rows], inputs)
         if direct:
-            compiled.settle_arrays(*part, out.cost[rows], out.iterations[rows], _is_large(out.cost))
+            compiled.settle_arrays(*part, out.cost[rows], out.iterations[rows], out.converged[rows])
         else:
             jax.tree.map(lambda whole, a: np.copyto(whole[rows], a), out, solve(part, method))
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(piece, range(0, batch, size)))
+    out.converged[:] &= valid
     return jax.device_put(out)  # which takes arrays over as they are, where `jnp.asarray` copies
 
 
-def _prepared(inputs, out: CostToGo):
-    """Arguments of `compiled.settle_arrays`, all but its results; says in `out` which arenas are valid."""
+def _prepared(inputs):
+    """Arguments of `compiled.settle_arrays`, all but its results; and which arenas are valid."""
     classes, levels, each, goal_ij = inputs
-    read, out.converged[:] = _tables(each)
-    goal_ij = np.where(out.converged[:, None], goal_ij, -1).astype(np.int32)
-    grids = (np.ascontiguousarray(_bytes(np.asarray(a))) for a in (classes, levels))
-    return jax.tree.map(np.asarray, read), *grids, goal_ij
-
-
-def _is_large(grids) -> bool:
-    return grids.shape[-2] * grids.shape[-1] > LARGE
+    read, valid = _tables(each)
+    valid = np.asarray(valid)
+    goal_ij = np.where(valid[:, None], goal_ij, np.int32(-1))
+    grids = (np.ascontiguousarray(a) for a in (classes, levels))
+    return (jax.tree.map(np.asarray, read), *grids, goal_ij), valid
 
 
 def _solve(edges, goal_ij, method: str, valid) -> CostToGo:
-    # Sums along a path drift by up to half a unit in the last place a move: with float32 a path through a
-    # large maze is off by more than 1e-5, so large grids are summed in float64, in any program.
-    double = method == "dijkstra" or _is_large(edges[0][1:-1, 1:-1, 0])
+    # Sums along a path drift by up to half a unit in the last place a move: as float32, a path of a thousand moves is
+    # off by more than 1e-5. So sums are float64, in any program.
     goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing is reached
-    with jax.enable_x64(double):
+    with jax.enable_x64(True):
         if method == "wavefront":
-            cost, steps = wavefront.settle(edges, goal_ij, double)
+            cost, steps, settled = wavefront.settle(edges, goal_ij)
         else:
-            cost, steps = compiled.settle(edges, goal_ij, method, double)
-        return CostToGo(cost, steps.astype(jnp.int32), valid)
+            cost, steps, settled = compiled.settle(edges, goal_ij, method)
+        return CostToGo(cost, steps.astype(jnp.int32), valid & settled)
 
 
-def _by_chunks(solve, inputs, large: bool) -> CostToGo:
+def _by_chunks(solve, inputs) -> CostToGo:
     """`solve(*inputs)` in chunks of the leading axis, one after the other."""
-    batch, size = inputs[0].shape[0], CHUNK_LARGE if large else CHUNK
-    if batch == 0:
-        return CostToGo(jnp.zeros((0, *inputs[0].shape[-2:])), jnp.zeros(0, jnp.int32), jnp.zeros(0, bool))
-    if batch <= size:
+    batch = inputs[0].shape[0]
+    if batch <= CHUNK:
         return solve(*inputs)
-    chunks = -(-batch // size)
-    pad = chunks * size - batch
+    chunks = -(-batch // CHUNK)
+    pad = chunks * CHUNK - batch
     parts = jax.tree.map(lambda a: jnp.pad(a, ((0, pad),) + ((0, 0),) * (a.ndim - 1), mode="edge"), inputs)
-    parts = jax.tree.map(lambda a: a.reshape(chunks, size, *a.shape[1:]), parts)
+    parts = jax.tree.map(lambda a: a.reshape(chunks, CHUNK, *a.shape[1:]), parts)
     out = lax.map(lambda part: solve(*part), parts)
-    return jax.tree.map(lambda a: a.reshape(chunks * size, *a.shape[2:])[:batch], out)
+    return jax.tree.map(lambda a: a.reshape(chunks * CHUNK, *a.shape[2:])[:batch], out)

@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.core.batching import unfold
+from jaxbiped.core.checks import whole_number
+from jaxbiped.planning.arguments import grid_arguments
 from jaxbiped.planning.costs import FORBIDDEN, IN_GATE, LEVEL, STEP, UNMEASURED, Costs, Rules, edge_costs
 from jaxbiped.planning.field import field
-from jaxbiped.planning.path import Path, read_path
+from jaxbiped.planning.path import Path, path_arguments, read_path
 
 KIND = Costs(c0=0.0, c1=float(LEVEL), c2=float(IN_GATE), c3=float(STEP), c4=float(UNMEASURED))
 """Under these costs a move costs what it is."""
@@ -24,13 +27,13 @@ KIND = Costs(c0=0.0, c1=float(LEVEL), c2=float(IN_GATE), c3=float(STEP), c4=floa
 class MoveCounts:
     """The moves of a path, by their shape and again by their kind. A path that is not valid has none."""
 
-    straight: Int[Array, "B"]
-    oblique: Int[Array, "B"]
-    level: Int[Array, "B"]  # on one level
-    gate: Int[Array, "B"]  # into, in and out of a gate
-    step: Int[Array, "B"]  # one level up or down
-    unmeasured: Int[Array, "B"]
-    valid: Bool[Array, "B"]
+    straight: Int[Array, "*B"]
+    oblique: Int[Array, "*B"]
+    level: Int[Array, "*B"]  # on one level
+    gate: Int[Array, "*B"]  # into, in and out of a gate
+    step: Int[Array, "*B"]  # one level up or down
+    unmeasured: Int[Array, "*B"]
+    valid: Bool[Array, "*B"]
 
     def per_cost(self) -> Costs:
         """How often each cost is paid: the gradient of the path's cost (paper, Eq. 1). Leaves [B], float32."""
@@ -40,16 +43,24 @@ class MoveCounts:
         )
 
 
-def move_counts(
-    path: Path,
-    classes: Int[Array | np.ndarray, "B H W"],
-    levels: Int[Array | np.ndarray, "B H W"],
-    rules: Rules | None = None,
-) -> MoveCounts:
-    """What the moves of paths over class grids are; arguments as those of `field` and `read_path`."""
+def move_counts(path: Path, classes: Any, levels: Any, rules: Rules | None = None) -> MoveCounts:
+    """What the moves of paths over class grids are. Leading axes broadcast, those of `path` with them.
+
+    Args:
+      path: as read on these grids.
+      classes, levels, rules: as of `field`.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
+    """
+    batch, inputs = grid_arguments(classes, levels, rules or Rules(), arrays=path_arguments(path))
+    return unfold(_move_counts(*inputs), batch)
+
+
+def _move_counts(classes, levels, rules: Rules, cells_ij, directions, valid) -> MoveCounts:
     kinds = edge_costs(classes, levels, KIND, rules)
-    moves = (path.directions >= 0) & path.valid[:, None]
-    ij, direction = jnp.where(moves[..., None], path.cells_ij[:, :-1], 0), jnp.maximum(path.directions, 0)
+    moves = (directions >= 0) & valid[:, None]
+    ij, direction = jnp.where(moves[..., None], cells_ij[:, :-1], 0), jnp.maximum(directions, 0)
     kind = kinds[jnp.arange(len(ij))[:, None], direction, ij[..., 0], ij[..., 1]]
     kind, oblique = jnp.where(moves, kind, FORBIDDEN), direction % 2 == 1
 
@@ -57,20 +68,20 @@ def move_counts(
         return jnp.sum(moves & what, axis=1, dtype=jnp.int32)
 
     by_kind = (count(kind == k) for k in (LEVEL, IN_GATE, STEP, UNMEASURED))
-    return MoveCounts(count(~oblique), count(oblique), *by_kind, path.valid)
+    return MoveCounts(count(~oblique), count(oblique), *by_kind, jnp.asarray(valid))
 
 
 def path_cost(
     costs: Costs,
-    classes: Int[Array | np.ndarray, "B H W"],
-    levels: Int[Array | np.ndarray, "B H W"],
+    classes: Any,
+    levels: Any,
     rules: Rules | None = None,
     *,
-    start_ij: Int[Array | np.ndarray, "B 2"],
-    goal_ij: Int[Array | np.ndarray, "B 2"],
-    heading: Int[Array | np.ndarray, "B"] | None = None,
+    start_ij: Any,
+    goal_ij: Any,
+    heading: Any = None,
     max_length: int | None = None,
-) -> Float[Array, "B"]:
+) -> Float[Array, "*B"]:
     """The cost of the best path of each arena (paper, Eq. 1), which `jax.grad` takes by the costs.
 
     The cost of one path is linear in C0 to C4, and counts how often each is paid. The least over all paths is
@@ -80,24 +91,25 @@ def path_cost(
     takes, which is a supergradient: f(c') <= f(c) + counts . (c' - c) for all c', up to `path.TIE` of f(c).
 
     By everything else the gradient is zero. There is no forward mode, and C0 must be positive: moves that cost nothing
-    may be left out of the counts.
+    may be left out of the counts. Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`.
 
     Args:
-      costs: scalars or [B] leaves.
+      costs: leaves [*B].
       classes, levels, rules, goal_ij: as of `field`.
       start_ij, heading: as of `read_path`.
       max_length: static; longer paths count as none. By default no path is too long.
 
     Returns:
       inf where there is no way; the gradient there is zero.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
     """
-    classes, levels = jnp.asarray(classes), jnp.asarray(levels)
-    batch, height, width = classes.shape
-    each = jax.tree.map(lambda leaf: jnp.broadcast_to(jnp.asarray(leaf, jnp.float32), (batch,)), costs)
-    heading = jnp.full(batch, -1) if heading is None else jnp.asarray(heading)
-    length = height * width - 1 if max_length is None else max_length
-    fixed = classes, levels, rules or Rules(), jnp.asarray(start_ij), jnp.asarray(goal_ij), heading
-    return least(each, fixed, length)
+    points = {"start_ij": start_ij, "goal_ij": goal_ij, "heading": -1 if heading is None else heading}
+    batch, (classes, levels, rules, each, *ends) = grid_arguments(classes, levels, rules or Rules(), costs, **points)
+    height, width = classes.shape[1:]
+    length = max(height * width - 1, 0) if max_length is None else whole_number("max_length", max_length)
+    return unfold(least(each, (classes, levels, rules, *ends), length), batch)
 
 
 @partial(jax.custom_vjp, nondiff_argnums=(2,))

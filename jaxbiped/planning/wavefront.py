@@ -14,16 +14,17 @@ from jaxbiped.planning.costs import DIRECTIONS
 DI, DJ = ([int(d) for d in column] for column in DIRECTIONS.T)
 
 
-def settle(edges, goal_ij, double: bool):
-    """(cost [B, H, W] float32, rounds until nothing changed [B]), summed as float64 if `double`, else as float32.
+def settle(edges, goal_ij):
+    """(cost [B, H, W] float32, rounds until nothing changed [B], whether the last changed nothing [B]); float64 sums.
 
-    Every round settles one more cell of each least path at least, so that H * W rounds always do.
+    Every round settles one more cell of each least path at least, so that `most_rounds` always do.
     """
     height, width, batch = edges[0].shape
+    most = most_rounds(height - 2, width - 2)
 
     def again(state):
         _, changed, _, step = state
-        return jnp.any(changed) & (step < height * width)
+        return jnp.any(changed) & (step < most)
 
     def body(state):
         cost, _, steps, step = state
@@ -31,10 +32,15 @@ def settle(edges, goal_ij, double: bool):
         changed = jnp.any(new < cost, axis=(0, 1))
         return new, changed, jnp.where(changed, step + 1, steps), step + 1
 
-    start = beginning((height, width), goal_ij, jnp.float64 if double else jnp.float32)
+    start = beginning((height, width), goal_ij, jnp.float64)
     state = start, jnp.ones((batch,), bool), jnp.zeros((batch,), jnp.int32), jnp.int32(0)
-    cost, _, steps, _ = lax.while_loop(again, body, state)
-    return jnp.moveaxis(cost[1:-1, 1:-1].astype(jnp.float32), -1, 0), steps
+    cost, changed, steps, _ = lax.while_loop(again, body, state)
+    return jnp.moveaxis(cost[1:-1, 1:-1].astype(jnp.float32), -1, 0), steps, ~changed
+
+
+def most_rounds(height: int, width: int) -> int:
+    """Rounds after which nothing can change any more: the last of them shows it."""
+    return height * width + 1
 
 
 def relaxed(edges, cost):

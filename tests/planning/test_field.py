@@ -195,12 +195,12 @@ def test_threads_that_begin_together_compile_a_kernel_once(monkeypatch):
     calls = []
 
     @cache
-    def slow(method, double):
+    def slow(method):
         calls.append(method)
         time.sleep(0.1)
         return method, 1
 
     monkeypatch.setattr(settle, "registered", slow)
     with ThreadPoolExecutor(4) as pool:
-        found = set(pool.map(lambda _: settle.target("line_sweep", False), range(4)))
+        found = set(pool.map(lambda _: settle.target("line_sweep"), range(4)))
     assert found == {("line_sweep", 1)} and calls == ["line_sweep"]

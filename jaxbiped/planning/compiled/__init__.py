@@ -2,12 +2,11 @@
 
 from jaxbiped.planning.compiled.crossing import crossing_faces
 from jaxbiped.planning.compiled.heading import settle_headings
-from jaxbiped.planning.compiled.line_sweep import LANES, LANES_LARGE
+from jaxbiped.planning.compiled.line_sweep import LANES
 from jaxbiped.planning.compiled.settle import METHODS, aligned, settle, settle_arrays, settle_grids
 
 __all__ = [
     "LANES",
-    "LANES_LARGE",
     "METHODS",
     "aligned",
     "crossing_faces",

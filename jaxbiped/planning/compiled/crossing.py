@@ -83,5 +83,8 @@ def crossing_faces(known, levels, half: int, slant: float):
     with LOCK:
         name = registered()
     batch, height, width = known.shape
+    levels = levels.astype(jnp.int16)
+    foreign.expect(known, (batch, height, width), np.bool_)
+    foreign.expect(levels, (batch, height, width), np.int16)
     result = jax.ShapeDtypeStruct((batch, 8, height, width), jnp.int8)
-    return jax.ffi.ffi_call(name, result)(known, levels.astype(jnp.int16), jnp.array([half, slant], jnp.float32))
+    return jax.ffi.ffi_call(name, result)(known, levels, jnp.array([half, slant], jnp.float32))

@@ -68,6 +68,12 @@ def answered(frame):
     return True
 
 
+def expect(array, shape: tuple[int, ...], dtype) -> None:
+    """Refuse what a kernel would read wrongly, or beyond its end: kernels do not look at what they are given."""
+    if tuple(array.shape) != tuple(shape) or array.dtype != dtype:
+        raise ValueError(f"a kernel wants {np.dtype(dtype).name} {list(shape)}, not {array.dtype} {list(array.shape)}")
+
+
 def register(name: str, function) -> None:
     """Make `function(arguments, count, results)`, a Numba function, callable as `jax.ffi.ffi_call(name, ...)`.
 

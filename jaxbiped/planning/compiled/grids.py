@@ -9,6 +9,7 @@ from numba import carray, njit
 
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.compiled import foreign, line_sweep
+from jaxbiped.planning.compiled.line_sweep import LANES
 from jaxbiped.planning.compiled.vector import pricing, translation, transposition
 from jaxbiped.planning.costs import FORBIDDEN
 
@@ -58,24 +59,43 @@ def turning(lanes: int):
     return spread, gather
 
 
-@cache
-def settler(lanes: int, dtype):
-    """The function `settle_all`, `lanes` arenas at a time, which adds up costs as `dtype`.
+def layout(batch: int, height: int, width: int) -> tuple[tuple[tuple[int, ...], type], ...]:
+    """Shape and dtype of each argument of `settle_all`: classes, levels, kinds_of, prices, cutting, goals."""
+    return (
+        ((batch, height, width), np.int8),
+        ((batch, height, width), np.int8),
+        ((batch, CLASSES), np.int8),
+        ((batch, 2, KINDS), np.float32),
+        ((batch,), np.int8),
+        ((batch, 2), np.int32),
+    )
 
-    `settle_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, cost, room, bytes, height, width)`, all
-    flat arrays but goals. Given for B >= lanes arenas: classes and levels of cells, int8 [B, H, W]; the kind of a cell
-    of each class, int8 [B, 5]; what moves of each kind cost, straight and oblique, float32 [B, 2, KINDS]; whether
-    corners may be cut, int8 [B]; goals int32 [B, 2]. Written: the cost to go, float32 [B, H, W], and passes, int32 [B].
-    Room to work in: `dtype` [size], float32 [4 * size], int8 [3 * size], with size = `room_size(height, width, lanes)`.
+
+@cache
+def settler(sweeps=line_sweep.sweeps):
+    """The function `settle_all`, `LANES` arenas at a time, which adds up costs as float64.
+
+    `settle_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, settled, cost, room, bytes, height,
+    width)`, all flat arrays but goals. Given for B >= LANES arenas: classes and levels of cells, int8 [B, H, W]; the
+    kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and oblique, float32 [B, 2,
+    KINDS]; whether corners may be cut, int8 [B]; goals int32 [B, 2]. Written: the cost to go, float32 [B, H, W];
+    passes, int32 [B]; whether one more relaxation lowers nothing, bool [B]. Room to work in: float64 [size], float32
+    [4 * size], int8 [3 * size], with size = `room_size(height, width)`.
+
+    Args:
+      sweeps: of `LANES`, the function that settles.
     """
-    settle = line_sweep.sweeps(lanes)
+    lanes = LANES
+    settle, unsettled = sweeps(lanes), line_sweep.proof(lanes)
     spread, gather = turning(lanes)
-    kind_of = translation(lanes, CLASSES, Cell.FLOOR)
+    kind_of = translation(lanes, CLASSES, Cell.OBSTACLE)
     straight, oblique = pricing(lanes, oblique=False), pricing(lanes, oblique=True)
 
     @njit(nogil=True)
-    def settle_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, cost, room, bytes, height, width):
-        line, size = (width + 2) * lanes, room_size(height, width, lanes)
+    def settle_all(
+        classes, levels, kinds_of, prices, cutting, goals, field, steps, settled, cost, room, bytes, height, width
+    ):
+        line, size = (width + 2) * lanes, room_size(height, width)
         edges = (room[:size], room[size : 2 * size], room[2 * size : 3 * size], room[3 * size : 4 * size])
         seen, level, kind = bytes[:size], bytes[size : 2 * size], bytes[2 * size :]
         seen[:], level[:] = OBSTACLE, 0  # the ring stays so
@@ -112,25 +132,28 @@ def settler(lanes: int, dtype):
                 edges + edges, goals[first : first + lanes], cost, 0, height, width, lanes, True
             )
             gather(cost, field, first, height, width)
+            wrong = unsettled(edges + edges, cost, 0, height, width, lanes, True)
+            for lane in range(lanes):
+                settled[first + lane] = (wrong >> np.uint64(lane)) & np.uint64(1) == 0
 
     return settle_all
 
 
 @njit(nogil=True)
-def room_size(height, width, lanes):
-    """Elements of a grid of `lanes` arenas with its ring."""
-    return (height + 2) * (width + 2) * lanes
+def room_size(height, width):
+    """Elements of a grid of `LANES` arenas with its ring."""
+    return (height + 2) * (width + 2) * LANES
 
 
-def solver(lanes: int, dtype):
-    """`settle_all` as `foreign.register` wants it: the first six arrays are arguments, the other five results."""
-    settle_all = settler(lanes, dtype)
+def solver():
+    """`settle_all` as `foreign.register` wants it: the first six arrays are arguments, the other six results."""
+    settle_all = settler()
 
     @njit
     def solve(arguments, count, results):
         dims = foreign.shape(results, 0)
         batch, height, width = np.int64(dims[0]), np.int64(dims[1]), np.int64(dims[2])
-        cells, size = batch * height * width, room_size(height, width, lanes)
+        cells, size = batch * height * width, room_size(height, width)
         settle_all(
             foreign.array(arguments, 0, cells, np.int8),
             foreign.array(arguments, 1, cells, np.int8),
@@ -140,9 +163,10 @@ def solver(lanes: int, dtype):
             carray(foreign.pointer(foreign.data(arguments, 5)), (batch, 2), np.int32),
             foreign.array(results, 0, cells, np.float32),
             foreign.array(results, 1, batch, np.int32),
-            foreign.array(results, 2, size, dtype),
-            foreign.array(results, 3, 4 * size, np.float32),
-            foreign.array(results, 4, 3 * size, np.int8),
+            foreign.array(results, 2, batch, np.bool_),
+            foreign.array(results, 3, size, np.float64),
+            foreign.array(results, 4, 4 * size, np.float32),
+            foreign.array(results, 5, 3 * size, np.int8),
             height,
             width,
         )

@@ -21,7 +21,7 @@ LOCK = Lock()
 
 @njit(nogil=True)
 def settle(time, face, turn, goal_i, goal_j, height, width, cost):
-    """One arena: `time` and `face` [8 * H * W] flat; `cost` [8 * H * W] is written."""
+    """One arena: `time` and `face` [8 * H * W] flat; `cost` [8 * H * W] is written. Returns whether it is settled."""
     cells = height * width
     cost[:] = np.inf
     heap = [(0.0, 0)]
@@ -48,6 +48,18 @@ def settle(time, face, turn, goal_i, goal_j, height, width, cost):
                 if total < cost[before]:
                     cost[before] = total
                     heapq.heappush(heap, (total, before))
+    # the proof: no state can be lowered by any of the moves and turns out of it
+    for state in range(8 * cells):
+        h, n = state // cells, state % cells
+        least = turn + min(cost[(h + 1) % 8 * cells + n], cost[(h + 7) % 8 * cells + n])
+        i, j = n // width, n % width
+        for k in ((h + 7) % 8, h, (h + 1) % 8):
+            a, b = i + DI[k], j + DJ[k]
+            if 0 <= a < height and 0 <= b < width and face[k * cells + n] == h:
+                least = min(least, cost[h * cells + a * width + b] + time[k * cells + n])
+        if least < cost[state]:
+            return False
+    return True
 
 
 @njit(nogil=True)
@@ -61,38 +73,48 @@ def solve(arguments, count, results):
     turn = foreign.array(arguments, 2, batch, np.float32)
     goals = carray(foreign.pointer(foreign.data(arguments, 3)), (batch, 2), np.int32)
     field = foreign.array(results, 0, batch * size, np.float32)
+    settled = foreign.array(results, 1, batch, np.bool_)
     cost = np.empty(size)
     for arena in range(batch):
-        part = slice(arena * size, (arena + 1) * size)
-        settle(time[part], face[part], float(turn[arena]), goals[arena, 0], goals[arena, 1], height, width, cost)
+        part, (i, j) = slice(arena * size, (arena + 1) * size), goals[arena]
+        settled[arena] = settle(time[part], face[part], float(turn[arena]), i, j, height, width, cost)
         field[part] = cost
 
 
 @cache
-def registered(method: str, double: bool) -> tuple[str, int]:
-    """The name by which XLA knows a kernel, and its lanes; compiled at the first call. "dijkstra" is always float64."""
-    name = f"jaxbiped_heading_{method}_{'float64' if double else 'float32'}"
-    lanes = 1 if method == "dijkstra" else sweep.LANES_LARGE if double else sweep.LANES
-    foreign.register(name, solve if method == "dijkstra" else sweep.solver(lanes, np.float64 if double else np.float32))
-    return name, lanes
+def registered(method: str) -> tuple[str, int]:
+    """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
+    name = f"jaxbiped_heading_{method}"
+    foreign.register(name, solve if method == "dijkstra" else sweep.solver())
+    return name, 1 if method == "dijkstra" else sweep.LANES
 
 
-def settle_headings(time, face, turn, goal_ij, method: str, double: bool):
-    """Least time [B, 8, H, W] float32 from each heading and cell to the goal, in any heading there.
+def settle_headings(time, face, turn, goal_ij, method: str):
+    """Least time [B, 8, H, W] float32 from each heading and cell to the goal, in any heading there, summed as float64;
+    and whether it is settled, bool [B].
 
     Args:
       time: of moves out of each cell in each direction, without the turn to `face`; float32 [B, 8, H, W], none NaN or
         negative.
       face: the heading in which each is made, at most one eighth off its direction; int8 [B, 8, H, W].
       turn: of one eighth, float32 [B], not negative.
-      goal_ij: [B, 2]; nothing is reached from one outside the grid.
+      goal_ij: int32 [B, 2]; nothing is reached from one outside the grid.
       method: "line_sweep" or "dijkstra".
-      double: sums are float64; with "dijkstra" they always are.
     """
     with LOCK:
-        name, lanes = registered(method, double or method == "dijkstra")
+        name, lanes = registered(method)
     batch = len(time)
-    inputs = time, face, turn, goal_ij.astype(jnp.int32)
+    inputs = time, face, turn, goal_ij
+    layout = ((time.shape, np.float32), (time.shape, np.int8), ((batch,), np.float32), ((batch, 2), np.int32))
+    for array, (shape, dtype) in zip(inputs, layout, strict=True):
+        foreign.expect(array, shape, dtype)
     if batch < lanes:
-        inputs = [jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1)) for a in inputs]
-    return jax.ffi.ffi_call(name, jax.ShapeDtypeStruct(inputs[0].shape, jnp.float32))(*inputs)[:batch]
+        # of no moves: there is nothing to sweep in the lanes that are added
+        inputs = [
+            jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1), constant_values=fill)
+            for a, fill in zip(inputs, (jnp.inf, 0, 0, -1), strict=True)
+        ]
+    many = max(batch, lanes)
+    results = jax.ShapeDtypeStruct(inputs[0].shape, jnp.float32), jax.ShapeDtypeStruct((many,), jnp.bool_)
+    cost, settled = jax.ffi.ffi_call(name, results)(*inputs)
+    return cost[:batch], settled[:batch]

@@ -16,24 +16,29 @@ from jaxbiped.planning.compiled import foreign
 from jaxbiped.planning.compiled.vector import relaxation
 from jaxbiped.planning.costs import DIRECTIONS
 
-LANES, LANES_LARGE = 16, 8  # arenas a vector, as float32 and as float64
+LANES = 8  # arenas a vector
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 
 
 @cache
-def settler(lanes: int, dtype):
-    """A function `settle(time, face, turn, goals, field, first, batch, height, width)` of arenas `first` and on.
+def settler(rounds: int = 0):
+    """A function `settle(time, face, turn, goals, field, settled, first, height, width)` of arenas `first` and on.
 
     `time`, `face` and `field` are [B * 8 * H * W] flat. Room of its own has the arenas last and a ring of inf:
-    [8 * (H + 2) * (W + 2) * lanes].
+    [8 * (H + 2) * (W + 2) * LANES]. Sums are float64. `settled` [B]: whether one more relaxation of every state lowers
+    none.
+
+    Args:
+      rounds: of sweeps, at most; 0 for as many as there is any use for.
     """
+    lanes = LANES
     relax = relaxation(lanes)
 
     @njit(nogil=True)
-    def settle(time, face, turns, goals, field, first, height, width):
+    def settle(time, face, turns, goals, field, settled, first, height, width):
         cells, line = height * width, (width + 2) * lanes
         plane = (height + 2) * line
-        cost, own = np.full(8 * plane, np.inf, dtype), np.full(8 * plane, np.inf, np.float32)
+        cost, own = np.full(8 * plane, np.inf), np.full(8 * plane, np.inf, np.float32)
         turn = turns[first : first + lanes].copy()
         askew = 0
         for lane in range(lanes):
@@ -68,8 +73,9 @@ def settler(lanes: int, dtype):
                                 count += 1
             firsts[h + 1] = count
         fresh = np.ones(8, np.bool_)  # layers that something has changed in or beside since they were swept
-        there = True
-        while fresh.any():
+        there, round = True, 0
+        while fresh.any() and (rounds == 0 or round < rounds):
+            round += 1
             for q in range(8):
                 h = q if there else 7 - q
                 if not fresh[h]:
@@ -102,13 +108,29 @@ def settler(lanes: int, dtype):
                     n = k * plane + (i + 1) * line + lanes + lane
                     for j in range(width):
                         field[at + j] = cost[n + j * lanes]
+        # the proof: every state once more, by each of the moves and turns out of it
+        less = np.uint64(0)
+        for a in range(count):
+            less |= relax(cost, places[a], places[a] + steps[a], spent, a * lanes)
+        for h in range(8):
+            left, right = ((h + 7) % 8 - h) * plane, ((h + 1) % 8 - h) * plane
+            step = DI[h] * line + DJ[h] * lanes
+            for i in range(1, height + 1):
+                n = h * plane + i * line + lanes
+                for _ in range(width):
+                    less |= relax(cost, n, n + left, turn, 0)
+                    less |= relax(cost, n, n + right, turn, 0)
+                    less |= relax(cost, n, n + step, own, n)
+                    n += lanes
+        for lane in range(lanes):
+            settled[first + lane] = (less >> np.uint64(lane)) & np.uint64(1) == 0
 
     return settle
 
 
-def solver(lanes: int, dtype):
-    """`settle` for all arenas of a batch, no fewer than lanes, as `foreign.register` wants it."""
-    settle = settler(lanes, dtype)
+def solver():
+    """`settle` for all arenas of a batch, no fewer than `LANES`, as `foreign.register` wants it."""
+    settle = settler()
 
     @njit
     def solve(arguments, count, results):
@@ -120,8 +142,9 @@ def solver(lanes: int, dtype):
         turn = foreign.array(arguments, 2, batch, np.float32)
         goals = carray(foreign.pointer(foreign.data(arguments, 3)), (batch, 2), np.int32)
         field = foreign.array(results, 0, size, np.float32)
-        for start in range(0, batch, lanes):
+        settled = foreign.array(results, 1, batch, np.bool_)
+        for start in range(0, batch, LANES):
             # the last arenas overlap those before
-            settle(time, face, turn, goals, field, min(start, batch - lanes), height, width)
+            settle(time, face, turn, goals, field, settled, min(start, batch - LANES), height, width)
 
     return solve

@@ -13,8 +13,9 @@ from numba import njit
 from jaxbiped.planning.compiled.vector import relaxation
 from jaxbiped.planning.costs import DIRECTIONS
 
-LANES, LANES_LARGE = 32, 16  # arenas a vector, as float32 and as float64: a few of their maps fit the cache of one core
-LEFT = tuple(int(dj) for dj in DIRECTIONS[:4, 1])  # columns that the first four directions go
+LANES = 16  # arenas a vector: a few of their maps fit the cache of one core
+DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
+LEFT = DJ[:4]  # columns that the first four directions go
 
 
 def sweeps(lanes: int):
@@ -24,7 +25,8 @@ def sweeps(lanes: int):
     from the row before and along itself, rightwards and then leftwards, so that a path which never turns back settles
     in one pass. After a pass all moves but those towards the other side are settled: a pass that changes nothing,
     after one the other way, ends the search. A row is skipped unless the row before has changed in this pass or the
-    last. `steps` [lanes] uint64: passes until nothing changed in each arena.
+    last; a goal changes its row before the first pass, for the rows above it as for those below. `steps` [lanes]
+    uint64: passes until nothing changed in each arena.
     """
     relax = relaxation(lanes)
 
@@ -71,7 +73,7 @@ def sweeps(lanes: int):
                 for _ in range(width):
                     n -= batch
                     less |= relax(cost, n, n + batch, ahead, n)
-                now[i] = less != 0
+                now[i] = less != 0 or (step == 0 and was[i])
                 changed |= less
             step += 1
             for lane in range(lanes):
@@ -80,3 +82,28 @@ def sweeps(lanes: int):
         return steps
 
     return settle
+
+
+def proof(lanes: int):
+    """A function `unsettled(edges, cost, first, height, width, batch, half) -> lanes`, arguments as of `sweeps`.
+
+    It relaxes every cell once more from all its neighbours. Bits of the lanes whose cost that lowers are set: their
+    field is not exact. Costs that are made of edges, and that no relaxation lowers, are the least.
+    """
+    relax = relaxation(lanes)
+
+    @njit(nogil=True)
+    def unsettled(edges, cost, first, height, width, batch, half):
+        line = (width + 2) * batch
+        less = np.uint64(0)
+        for k in range(8):
+            to = DI[k] * line + DJ[k] * batch
+            back = to if half and k >= 4 else 0
+            for i in range(1, height + 1):
+                n = i * line + batch + first
+                for _ in range(width):
+                    less |= relax(cost, n, n + to, edges[k], n + back)
+                    n += batch
+        return less
+
+    return unsettled

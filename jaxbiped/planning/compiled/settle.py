@@ -11,7 +11,7 @@ import numpy as np
 from numba import carray, njit
 
 from jaxbiped.planning.compiled import dijkstra, foreign, grids, line_sweep
-from jaxbiped.planning.compiled.line_sweep import LANES, LANES_LARGE
+from jaxbiped.planning.compiled.line_sweep import LANES
 
 
 @njit
@@ -20,8 +20,9 @@ def edge(arguments, k, size):
     return foreign.array(arguments, k, size, np.float32)
 
 
-def solver(settle, lanes: int, dtype):
+def solver(settle, lanes: int):
     """`settle` for all arenas of a batch, `lanes` at a time, as `foreign.register` wants it."""
+    unsettled = line_sweep.proof(lanes)
 
     @njit
     def solve(arguments, count, results):
@@ -38,7 +39,8 @@ def solver(settle, lanes: int, dtype):
         goals = carray(foreign.pointer(foreign.data(arguments, count - 1)), (batch, 2), np.int32)
         field = carray(foreign.pointer(foreign.data(results, 0)), (batch, height, width), np.float32)
         steps = carray(foreign.pointer(foreign.data(results, 1)), (batch,), np.int32)
-        cost = carray(foreign.pointer(foreign.data(results, 2)), (size,), dtype)
+        settled = carray(foreign.pointer(foreign.data(results, 2)), (batch,), np.bool_)
+        cost = carray(foreign.pointer(foreign.data(results, 3)), (size,), np.float64)
         cost[:] = np.inf
         for arena in range(batch):
             i, j = goals[arena]
@@ -51,6 +53,9 @@ def solver(settle, lanes: int, dtype):
                     row = ((i + 1) * (width + 2) + 1) * batch + arena
                     for j in range(width):
                         field[arena, i, j] = cost[row + j * batch]
+            wrong = unsettled(edges, cost, first, height, width, batch, half)
+            for lane in range(lanes):
+                settled[first + lane] = (wrong >> np.uint64(lane)) & np.uint64(1) == 0
 
     return solve
 
@@ -60,87 +65,98 @@ LINE = 64  # [bytes] of the cache
 GRIDS = "grids"  # line sweeps straight from grids
 
 
-def target(kernel: str, double: bool) -> tuple[str, int]:
+def target(kernel: str) -> tuple[str, int]:
     """`registered`, by one thread at a time: XLA holds the address of what was registered first."""
     with LOCK:
-        return registered(kernel, double)
+        return registered(kernel)
 
 
 LOCK = Lock()
 
 
 @cache
-def registered(kernel: str, double: bool) -> tuple[str, int]:
-    """The name by which XLA knows a kernel, and its lanes; compiled at the first call. "dijkstra" is always float64."""
-    name = f"jaxbiped_{kernel}_{'float64' if double else 'float32'}"
-    dtype = np.float64 if double else np.float32
-    lanes = 1 if kernel == "dijkstra" else LANES_LARGE if double else LANES
+def registered(kernel: str) -> tuple[str, int]:
+    """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
+    name, lanes = f"jaxbiped_{kernel}", 1 if kernel == "dijkstra" else LANES
     if kernel == GRIDS:
-        foreign.register(name, grids.solver(lanes, dtype))
+        foreign.register(name, grids.solver())
     else:
-        settle = dijkstra.settle if kernel == "dijkstra" else line_sweep.sweeps(lanes)
-        foreign.register(name, solver(settle, lanes, dtype))
+        foreign.register(name, solver(dijkstra.settle if kernel == "dijkstra" else line_sweep.sweeps(lanes), lanes))
     return name, lanes
 
 
-def settle(edges, goal_ij, method: str, double: bool):
-    """(cost [B, H, W] float32, steps until nothing changed [B]), summed as float64 if `double`, else as float32.
+def settle(edges, goal_ij, method: str):
+    """(cost [B, H, W] float32, steps until nothing changed [B], whether it is settled [B]), summed as float64.
 
     Args:
       edges: tuple of eight float32 arrays [H + 2, W + 2, B] with a ring of inf, the costs of leaving a cell in each of
         `DIRECTIONS`, or of the first four where a move costs what the move back costs; none may be NaN or negative.
       goal_ij: [B, 2]; nothing is reached from one outside the grid.
     """
-    name, lanes = target(method, double)
+    name, lanes = target(method)
     height, width, batch = edges[0].shape
+    for e in edges:
+        foreign.expect(e, (height, width, batch), np.float32)
+    foreign.expect(goal_ij, (batch, 2), np.int32)
     many = -(-batch // lanes) * lanes
     edges = [jnp.pad(e, ((0, 0), (0, 0), (0, many - batch)), constant_values=jnp.inf) for e in edges]
-    goal_ij = jnp.pad(goal_ij.astype(jnp.int32), ((0, many - batch), (0, 0)), constant_values=-1)
+    goal_ij = jnp.pad(goal_ij, ((0, many - batch), (0, 0)), constant_values=-1)
     results = (
         jax.ShapeDtypeStruct((many, height - 2, width - 2), jnp.float32),
         jax.ShapeDtypeStruct((many,), jnp.int32),
-        jax.ShapeDtypeStruct((height, width, many), jnp.float64 if double else jnp.float32),  # room to work in
+        jax.ShapeDtypeStruct((many,), jnp.bool_),
+        jax.ShapeDtypeStruct((height, width, many), jnp.float64),  # room to work in
     )
-    cost, steps, _ = jax.ffi.ffi_call(name, results)(*edges, goal_ij)
-    return cost[:batch], steps[:batch]
+    cost, steps, settled, _ = jax.ffi.ffi_call(name, results)(*edges, goal_ij)
+    return cost[:batch], steps[:batch], settled[:batch]
 
 
-def settle_grids(tables, classes, levels, goal_ij, double: bool):
+def settle_grids(tables, classes, levels, goal_ij):
     """`settle` by line sweeps, straight from grids, without ever holding the edges of more than a few arenas.
 
     Args:
       tables: of each arena: the kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and
         oblique, float32 [B, 2, KINDS], none NaN or negative; whether corners may be cut, int8 [B].
-      classes, levels: int8 [B, H, W].
+      classes, levels: int8 [B, H, W]; a cell of no class is an obstacle.
     """
-    name, lanes = target(GRIDS, double)
+    name, lanes = target(GRIDS)
     batch, height, width = classes.shape
-    inputs = (classes, levels, *tables, goal_ij.astype(jnp.int32))
+    inputs = (classes, levels, *tables, goal_ij)
+    for array, (shape, dtype) in zip(inputs, grids.layout(batch, height, width), strict=True):
+        foreign.expect(array, shape, dtype)
     if batch < lanes:
         inputs = [jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1)) for a in inputs]
-    many, size = max(batch, lanes), int(grids.room_size(height, width, lanes))
+    many, size = max(batch, lanes), int(grids.room_size(height, width))
     results = (
         jax.ShapeDtypeStruct((many, height, width), jnp.float32),
         jax.ShapeDtypeStruct((many,), jnp.int32),
-        jax.ShapeDtypeStruct((size,), jnp.float64 if double else jnp.float32),
+        jax.ShapeDtypeStruct((many,), jnp.bool_),
+        jax.ShapeDtypeStruct((size,), jnp.float64),
         jax.ShapeDtypeStruct((4 * size,), jnp.float32),
         jax.ShapeDtypeStruct((3 * size,), jnp.int8),
     )
-    cost, steps, *_ = jax.ffi.ffi_call(name, results)(*inputs)
-    return cost[:batch], steps[:batch]
+    cost, steps, settled, *_ = jax.ffi.ffi_call(name, results)(*inputs)
+    return cost[:batch], steps[:batch], settled[:batch]
 
 
-def settle_arrays(tables, classes, levels, goal_ij, cost, steps, double: bool) -> None:
-    """`settle_grids` of NumPy arrays, contiguous, of no fewer arenas than lanes; results go into `cost` and `steps`.
+def settle_arrays(tables, classes, levels, goal_ij, cost, steps, settled) -> None:
+    """`settle_grids` of NumPy arrays, of no fewer arenas than lanes; results go into `cost`, `steps` and `settled`.
 
     From other threads it runs at the same time.
     """
-    lanes, dtype = (LANES_LARGE, np.float64) if double else (LANES, np.float32)
-    height, width = classes.shape[1:]
-    size = grids.room_size(height, width, lanes)
-    grids.settler(lanes, dtype)(
-        classes.ravel(), levels.ravel(), *(table.ravel() for table in tables), goal_ij, cost.ravel(), steps,
-        aligned(size, dtype), aligned(4 * size, np.float32), aligned(3 * size, np.int8), height, width,
+    batch, height, width = classes.shape
+    inputs = (classes, levels, *tables, goal_ij)
+    results = ((cost, classes.shape, np.float32), (steps, (batch,), np.int32), (settled, (batch,), np.bool_))
+    for array, (shape, dtype) in zip(inputs, grids.layout(batch, height, width), strict=True):
+        foreign.expect(array, shape, dtype)
+    for array, shape, dtype in results:
+        foreign.expect(array, shape, dtype)
+    if batch < LANES or not all(array.flags.c_contiguous for array in (*inputs, cost, steps, settled)):
+        raise ValueError(f"needs at least {LANES} arenas, in contiguous arrays")
+    size = grids.room_size(height, width)
+    grids.settler()(
+        classes.ravel(), levels.ravel(), *(table.ravel() for table in tables), goal_ij, cost.ravel(), steps, settled,
+        aligned(size, np.float64), aligned(4 * size, np.float32), aligned(3 * size, np.int8), height, width,
     )  # fmt: skip
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import cache, partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -10,8 +12,10 @@ import numpy as np
 from jax import lax
 from jaxtyping import Array, Bool, Float, Int, Int8
 
+from jaxbiped.core.batching import folding_vmap, unfold
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import compiled
+from jaxbiped.planning.arguments import grid_arguments
 from jaxbiped.planning.costs import DIRECTIONS
 
 WINDOW = 0.20  # [m] radius of the disc of cells around a move that say how its edge runs; as `motion.edge`
@@ -20,19 +24,31 @@ EIGHTH = math.pi / 4
 NOWHERE = 999  # no level
 
 
-def crossing_faces(classes: Int[Array, "B H W"], levels: Int[Array, "B H W"], pitch: float) -> Int8[Array, "B 8 H W"]:
+def crossing_faces(classes: Any, levels: Any, pitch: float) -> Int8[Array, "*B 8 H W"]:
     """The direction (of the eight) nearest to the one square to the edge, for the move out of each cell in each.
 
     `motion.edge.crossing_direction` of all moves at once (paper, 2.4), rounded to 45 degrees. It says something of
-    moves over an edge of one level alone; where no edge is seen it is the move's own direction.
+    moves over an edge of one level alone; where no edge is seen it is the move's own direction. Leading axes broadcast.
 
     Args:
+      classes, levels: as of `planning.field`.
       pitch: static [m].
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
     """
-    known = (classes != Cell.UNMEASURED) & (classes != Cell.OBSTACLE)
-    if jax.default_backend() == "cpu":
-        return compiled.crossing_faces(known, levels, window(pitch), SLANT)
-    return dense_faces(known, levels, pitch)
+    batch, (classes, levels) = grid_arguments(classes, levels)
+    known = (classes != Cell.UNMEASURED) & (classes < Cell.OBSTACLE) & (classes >= 0)
+    if known.size == 0:
+        return unfold(jnp.zeros((len(known), 8, *known.shape[1:]), jnp.int8), batch)
+    faces = on_cpu(window(pitch)) if jax.default_backend() == "cpu" else partial(dense_faces, pitch=pitch)
+    return unfold(faces(jnp.asarray(known), jnp.asarray(levels)), batch)
+
+
+@cache
+def on_cpu(half: int):
+    """The compiled kernel for a window of `half` cells, as a function that `vmap` knows what to do with."""
+    return folding_vmap(lambda known, levels: compiled.crossing_faces(known, levels, half, SLANT))
 
 
 def window(pitch: float) -> int:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import lax
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
+from jaxbiped.core.batching import fold, unfold
+from jaxbiped.core.checks import cells, flags, integers, leading_shape, narrowed, reals, whole_number
 from jaxbiped.planning.costs import DIRECTIONS
 from jaxbiped.planning.heading.field import HeadingField
 from jaxbiped.planning.heading.times import Moves
-from jaxbiped.planning.path import Path, pick
+from jaxbiped.planning.path import Path, no_path, path_arguments, pick
 
 EIGHTH = math.pi / 4
 
@@ -24,23 +28,50 @@ def eighths(angle: Float[Array, "*S"]) -> Float[Array, "*S"]:
     return jnp.abs(jnp.mod(angle + math.pi, 2 * math.pi) - math.pi) / EIGHTH
 
 
-@partial(jax.jit, static_argnames="max_length")
-def heading_path(
-    field: HeadingField, start_ij: Int[Array | np.ndarray, "B 2"], yaw: Float[Array | np.ndarray, "B"], max_length: int
-) -> Path:
+def heading_path(field: HeadingField, start_ij: Any, yaw: Any, max_length: int) -> Path:
     """The quickest way from each start. `Path.cost` is its time [s], with the turn from `yaw` to the first move.
 
     Of ways that are equally quick (`planning.path.TIE`) it keeps to the robot's present direction, else takes the first
-    in the order of `DIRECTIONS`. It ends at the goal.
+    in the order of `DIRECTIONS`. It ends at the goal. Leading axes broadcast. May be called inside `jit`, `vmap` and
+    `scan`.
 
     Args:
-      start_ij: outside the grid there is no way.
-      yaw: [rad] any, not only multiples of 45 degrees.
+      field: where it did not converge there is no way.
+      start_ij: [*B, 2], integers; outside the grid there is no way.
+      yaw: [*B] [rad] any, not only multiples of 45 degrees.
       max_length: static; number of moves that there is room for.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype.
     """
+    start, yaw = cells("start_ij", start_ij), reals("yaw", yaw)
+    length = whole_number("max_length", max_length)
+    given = field_arguments(field.moves, field.turn)
+    given["field.cost"] = reals("field.cost", field.cost, "8 H W"), "8 H W"
+    given["field.converged"] = flags("field.converged", field.converged), ""
+    batch = leading_shape(**given, start_ij=(start, "2"), yaw=(yaw, ""))
+    time, face, turn, cost, converged = (fold(array, batch, len(core.split())) for array, core in given.values())
+    start, yaw = fold(start, batch, 1), fold(yaw, batch, 0)
+    if math.prod(cost.shape[2:]) == 0:
+        return no_path(start, length, batch)
+    field = HeadingField(cost, Moves(time, face), turn, converged)
+    return unfold(_heading_path(jax.tree.map(jnp.asarray, field), start, yaw, length), batch)
+
+
+def field_arguments(moves: Moves, turn: Any) -> dict[str, tuple[Any, str]]:
+    """Moves and the time of a turn, checked, as `leading_shape` takes them."""
+    return {
+        "moves.time": (reals("moves.time", moves.time, "8 H W"), "8 H W"),
+        "moves.face": (narrowed(integers("moves.face", moves.face, "8 H W", (0, 7)), np.int8, 0, 7), "8 H W"),
+        "turn": (reals("turn", turn), ""),
+    }
+
+
+@partial(jax.jit, static_argnames="max_length")
+def _heading_path(field: HeadingField, start, yaw, max_length: int) -> Path:
+    field = replace(field, cost=jnp.where(field.converged[:, None, None, None], field.cost, jnp.inf))
     height, width = field.cost.shape[-2:]
     arena, moves = jnp.arange(field.cost.shape[0]), jnp.asarray(DIRECTIONS, jnp.int32)
-    start = jnp.asarray(start_ij, jnp.int32)
     inside = ((start >= 0) & (start < jnp.array([height, width]))).all(-1)
 
     def ahead(ij, yaw):
@@ -67,19 +98,35 @@ def heading_path(
         yaw = jnp.where(goes, jnp.take_along_axis(face, direction[:, None], 1)[:, 0] * EIGHTH, yaw)
         return (ij, yaw), (jnp.where(goes[:, None], ij, -1), direction)
 
-    first = jnp.where(inside[:, None], start, 0), jnp.asarray(yaw, jnp.float32)
-    (last, _), (cells, directions) = lax.scan(step, first, None, length=max_length)
+    first = jnp.where(inside[:, None], start, 0), jnp.asarray(yaw)
+    (last, _), (passed, directions) = lax.scan(step, first, None, length=max_length)
     total = jnp.where(at_goal(first[0]), 0.0, ahead(*first)[0].min(-1))
     total = jnp.where(inside, total, jnp.inf)
-    cells = jnp.moveaxis(jnp.concatenate([start[None], cells]), 0, 1)
-    return Path(cells, directions.T, (directions >= 0).sum(0), total, inside & at_goal(last))
+    passed = jnp.moveaxis(jnp.concatenate([start[None], passed]), 0, 1)
+    length = (directions >= 0).sum(0, dtype=jnp.int32)
+    return Path(passed, directions.T, length, total, inside & at_goal(last))
+
+
+def path_time(moves: Moves, turn: Any, path: Path, yaw: Any) -> Float[Array, "*B"]:
+    """What any way takes [s], that of Eq. 1 for one: turns from `yaw` on, and moves; inf where it is not valid.
+
+    Leading axes broadcast. May be called inside `jit`, `vmap`, `scan` and `grad`.
+
+    Args:
+      moves: of `heading_moves`; turn: [*B] [s] for 45 degrees.
+      path: on the same grid; yaw: [*B] [rad].
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype.
+    """
+    given = field_arguments(moves, turn) | path_arguments(path) | {"yaw": (reals("yaw", yaw), "")}
+    batch = leading_shape(**given)
+    inputs = (fold(array, batch, len(core.split())) for array, core in given.values())
+    return unfold(_path_time(*map(jnp.asarray, inputs)), batch)
 
 
 @jax.jit
-def path_time(
-    moves: Moves, turn: Float[Array, "B"], path: Path, yaw: Float[Array | np.ndarray, "B"]
-) -> Float[Array, "B"]:
-    """What any way takes [s], that of Eq. 1 for one: turns from `yaw` on, and moves; inf where it is not valid."""
+def _path_time(time, face, turn, cells_ij, directions, valid, yaw) -> Float[Array, "B"]:
     arena = jnp.arange(turn.shape[0])
 
     def step(state, moved):
@@ -87,11 +134,10 @@ def path_time(
         ij, direction = moved
         goes, k = direction >= 0, jnp.maximum(direction, 0).astype(jnp.int32)
         i, j = jnp.maximum(ij[:, 0], 0), jnp.maximum(ij[:, 1], 0)
-        face = moves.face[arena, k, i, j] * EIGHTH
-        spent = turn * eighths(face - yaw) + moves.time[arena, k, i, j]
-        return (total + jnp.where(goes, spent, 0.0), jnp.where(goes, face, yaw)), None
+        faced = face[arena, k, i, j] * EIGHTH
+        spent = turn * eighths(faced - yaw) + time[arena, k, i, j]
+        return (total + jnp.where(goes, spent, 0.0), jnp.where(goes, faced, yaw)), None
 
-    first = jnp.zeros(turn.shape), jnp.asarray(yaw, jnp.float32)
-    ways = jnp.moveaxis(path.cells_ij[:, :-1], 1, 0), path.directions.T
-    total = lax.scan(step, first, ways)[0][0]
-    return jnp.where(path.valid, total, jnp.inf)
+    first = jnp.zeros(turn.shape), yaw
+    total = lax.scan(step, first, (jnp.moveaxis(cells_ij[:, :-1], 1, 0), directions.T))[0][0]
+    return jnp.where(valid, total, jnp.inf)

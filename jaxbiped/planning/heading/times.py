@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int, Int8
+import numpy as np
+from jaxtyping import Array, Float, Int8
 
+from jaxbiped.core.batching import unfold
+from jaxbiped.core.checks import reals
+from jaxbiped.errors import InputError
+from jaxbiped.planning.arguments import grid_arguments
 from jaxbiped.planning.costs import (
     BASE_PITCH,
     DIRECTIONS,
@@ -45,17 +51,12 @@ class Times:
 class Moves:
     """Moves out of each cell in each of `DIRECTIONS`."""
 
-    time: Float[Array, "B 8 H W"]  # [s] without the turn to `face`; inf: forbidden
-    face: Int8[Array, "B 8 H W"]  # the direction that the robot faces from then on: the move's own, but for edges
+    time: Float[Array, "*B 8 H W"]  # [s] without the turn to `face`; inf: forbidden
+    face: Int8[Array, "*B 8 H W"]  # the direction that the robot faces from then on: the move's own, but for edges
 
 
 def heading_moves(
-    classes: Int[Array, "B H W"],
-    levels: Int[Array, "B H W"],
-    times: Times,
-    rules: Rules,
-    pitch: float = BASE_PITCH,
-    extra: Float[Array, "B 8 H W"] | None = None,
+    classes: Any, levels: Any, times: Times, rules: Rules, pitch: float = BASE_PITCH, extra: Any = None
 ) -> Moves:
     """The moves that Eq. 1 knows, in the seconds that the mission's clock counts for them (`motion.duration`).
 
@@ -63,21 +64,50 @@ def heading_moves(
     one primitive, and share its measurement. Precedence is that of Eq. 1 (`costs.move_kind`): an end unmeasured, then a
     step, then an end in a gate. Over an edge the robot faces square to it (`crossing_faces`), and stays so; a step
     carries it forward, and what the move leads to the side of that is walked. Before the unmeasured it looks once more.
+    Leading axes broadcast.
 
     Deviations from the clock: yaws are multiples of 45 degrees and places are cells; a primitive that crosses an edge
     on a fine pitch carries the robot over several cells, here over one.
 
     Args:
-      times, rules: leaves are scalars or [B]; none of the times negative or NaN.
+      classes, levels: as of `planning.field`.
+      times, rules: leaves [*B]; none of the times negative or NaN.
       pitch: static [m].
-      extra: [s] to be added to each move, not below 0.
+      extra: [*B, 8, H, W], seconds to be added to each move, not below 0.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
     """
+    pitch = checked_pitch(pitch)
+    arrays = {} if extra is None else {"extra": (reals("extra", extra, "8 H W"), "8 H W")}
+    batch, inputs = grid_arguments(classes, levels, times, rules, arrays=arrays)
+    classes, levels, times, rules, *more = jax.tree.map(jnp.asarray, inputs)
+    return unfold(moves_of(classes, levels, times, rules, pitch, *more), batch)
 
-    def each(leaf):
-        return jnp.asarray(leaf, jnp.float32).reshape(-1, 1, 1) if jnp.ndim(leaf) else jnp.asarray(leaf, jnp.float32)
 
-    t = jax.tree.map(each, times)
-    allowed = jax.tree.map(lambda leaf: jnp.asarray(leaf).reshape(-1, 1, 1) if jnp.ndim(leaf) else leaf, rules)
+def checked_pitch(pitch: Any) -> float:
+    """A pitch [m], which is static: a positive number.
+
+    Raises:
+      InputError: anything else.
+    """
+    if isinstance(pitch, bool) or not isinstance(pitch, (int, float, np.number)) or not 0 < pitch < math.inf:
+        shown = pitch if isinstance(pitch, (int, float, str)) else type(pitch).__name__
+        raise InputError("must be a number of metres above 0", field="pitch", value=shown)
+    return float(pitch)
+
+
+def moves_of(
+    classes: Int8[Array, "B H W"],
+    levels: Int8[Array, "B H W"],
+    times: Times,
+    rules: Rules,
+    pitch: float,
+    extra: Float[Array, "B 8 H W"] | None = None,
+) -> Moves:
+    """`heading_moves` of arguments that are checked, all [B]."""
+
+    t, allowed = jax.tree.map(lambda leaf: leaf[:, None, None], (times, rules))
     kinds = cell_kinds(classes, allowed)
     share = t.measure / max(1, round(BASE_PITCH / pitch))
     faces = crossing_faces(classes, levels, pitch)
