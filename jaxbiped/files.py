@@ -114,5 +114,9 @@ def read_yaml(path: str | Path) -> Any:
         mark = error.problem_mark or error.context_mark
         where = f": line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         raise InputError(f"is not valid YAML{where}", file=path) from None
-    except (yaml.YAMLError, ValueError, RecursionError):  # characters, dates and numbers that cannot be; endless nesting
+    except (
+        yaml.YAMLError,
+        ValueError,
+        RecursionError,
+    ):  # no characters, dates or numbers; endless nesting
         raise InputError("is not valid YAML", file=path) from None

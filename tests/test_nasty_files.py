@@ -27,7 +27,9 @@ MIDDLEBURY = (
     b"cam0=[994.978 0 311.193; 0 994.978 254.877; 0 0 1]\ncam1=[994.978 0 342.279; 0 994.978 254.877; 0 0 1]\n"
     b"doffs=31.086\nbaseline=193.001\nwidth=741\nheight=500\nndisp=70\n"
 )
-ROS_MAP = b"image: m.pgm\nresolution: 0.05\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+ROS_MAP = (
+    b"image: m.pgm\nresolution: 0.05\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.2\n"
+)
 PGM = b"P5\n# written by hand\n4 3\n255\n" + bytes(range(0, 240, 20))
 PLAIN_PGM = b"P2\n# written by hand\n4 3\n255\n0 20 40 60\n80 100 120 140\n160 180 200 220\n"
 
@@ -83,6 +85,12 @@ def archive(**arrays):
     return stream.getvalue()
 
 
+def array(points):
+    stream = io.BytesIO()
+    np.save(stream, points)
+    return stream.getvalue()
+
+
 def picture(kind, **how):
     stream = io.BytesIO()
     Image.fromarray(np.random.default_rng(1).integers(0, 255, (12, 16), np.uint8)).save(stream, kind, **how)
@@ -123,11 +131,11 @@ TEXTS = {
     "b.pcd": (None, lambda path: cloud.load(path).points.tolist()),
 }
 BINARIES = {
-    "b.ply": lambda folder: binary_ply(folder),
+    "b.ply": binary_ply,
     "c.pcd": lambda folder: pcd(folder, "binary"),
     "d.pcd": lambda folder: pcd(folder, "binary_compressed"),
     "a.npz": lambda folder: archive(points=POINTS),
-    "a.npy": lambda folder: archive(points=POINTS)[40:],
+    "a.npy": lambda folder: array(POINTS),
     "grid.npz": lambda folder: archive(
         classes=np.ones((3, 4), np.int8), levels=np.zeros((3, 4), np.int8), origin_xy=np.zeros(2), pitch=0.05
     ),

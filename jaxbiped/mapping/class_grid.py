@@ -133,10 +133,10 @@ def save(grid: ClassGrid, path: str | Path) -> None:
 
 def read_arrays(path: str | Path) -> dict[str, np.ndarray | None]:
     """The arrays of an `.npz` under `KEYS`, and the first other key as None; raises what NumPy raises."""
-    loaded = np.load(path, allow_pickle=False)
-    if isinstance(loaded, np.ndarray):
-        raise InputError("must be an .npz class grid, not a single array", file=path)
-    with loaded as archive:
+    with open(path, "rb") as file:
+        archive = np.load(file, allow_pickle=False)
+        if isinstance(archive, np.ndarray):
+            raise InputError("must be an .npz class grid, not a single array", file=path)
         names = [name for name in archive.files if name in KEYS] + [n for n in archive.files if n not in KEYS][:1]
         return {name: archive[name] if name in KEYS else None for name in names}
 

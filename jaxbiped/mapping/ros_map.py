@@ -31,7 +31,7 @@ from pydantic import Field, model_validator
 
 from jaxbiped.config import Model, parse
 from jaxbiped.errors import InputError
-from jaxbiped.files import reason, read_yaml
+from jaxbiped.files import read_yaml, reason
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.sensing.image_depth import no_chatter, sample_bits

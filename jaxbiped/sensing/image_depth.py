@@ -1,7 +1,7 @@
 """Pictures of more than 8 bits a sample: which they are, and their samples, none of whose bits are lost.
 
-Pillow reads every kind of picture, but brings colour of more than 8 bits down to 8 without a word, takes white for black
-in deep TIFF files, and does not know some of these at all. OpenCV keeps the bits, where it is asked to.
+Pillow reads every kind of picture, but brings colour of more than 8 bits down to 8 without a word, takes white for
+black in deep TIFF files, and does not know some of these at all. OpenCV keeps the bits, where it is asked to.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ def plain(node: cv2.FileNode) -> Any:
             matrix = None
         if matrix is not None:
             return np.asarray(matrix, np.float64)
-        return {key: plain(node.getNode(key)) for key in node.keys()}  # noqa: SIM118: a node is no mapping
+        return {key: plain(node.getNode(key)) for key in list(node.keys())}
     if node.isSeq():
         return [plain(node.at(k)) for k in range(min(node.size(), LONGEST))]
     if node.isString():
@@ -184,9 +184,7 @@ def read_middlebury(path: Path, shape: tuple[int, int]) -> dict:
     return data
 
 
-def one_number(
-    fields: dict[str, str], name: str, path: Path, default: float | int | None = None
-) -> float | int | None:
+def one_number(fields: dict[str, str], name: str, path: Path, default: float | int | None = None) -> float | int | None:
     """The number of a field, or what it is by default."""
     if name not in fields:
         return default

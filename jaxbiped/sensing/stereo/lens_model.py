@@ -1,7 +1,7 @@
 """Lens models in other people's calibration files: which of them OpenCV's pinhole with distortion fits.
 
-A fisheye lens has four coefficients, as many as a pinhole with distortion, so that the numbers do not tell the two apart
-and the name must: taken for the other, its pictures bend by up to a hundred pixels.
+A fisheye lens has four coefficients, as many as a pinhole with distortion, so that the numbers do not tell the two
+apart and the name must: taken for the other, its pictures bend by up to a hundred pixels.
 """
 
 from __future__ import annotations
@@ -17,11 +17,13 @@ from jaxbiped.errors import InputError
 
 # Coefficients of all of these are in OpenCV's order: k1, k2, p1, p2, k3, ...
 FITTING = ("pinhole", "plumb_bob", "radtan", "rational_polynomial", "none")
-SAME = {
-    *("", "perspective", "projective", "linear", "ideal", "opencv", "standard", "distorted", "undistorted", "rectified"),
-    *("plumbbob", "pinholeradtan", "pinholebrown", "radialtangential", "radialtan", "brown", "brownconrady"),
-    *("rational", "rationalpolynomial", "pinhole", "radtan", "none", "no", "null", "false", "0"),
+# fmt: off
+SAME = {  # the same in other words, small letters and digits alone
+    "", "pinhole", "perspective", "projective", "linear", "ideal", "opencv", "standard", "rectified", "distorted",
+    "undistorted", "plumbbob", "radtan", "radialtan", "radialtangential", "brown", "brownconrady", "pinholeradtan",
+    "pinholebrown", "rational", "rationalpolynomial", "none", "no", "null", "false", "0",
 }
+# fmt: on
 OTHER = re.compile(
     r"fish|equi|omni|mei|unified|sphere|eucm|kannala|kb4|ocam|scaramuzza|cata|panoram|cylind|prism|ftheta|^f?ov$|atan"
 )

@@ -115,7 +115,9 @@ def test_other_lenses_in_an_opencv_file(tmp_path, line, key):
 
 def test_other_lenses_in_xml_and_in_a_middlebury_file(tmp_path):
     text = opencv_file(tmp_path / "rig.xml", [-0.2, 0.001, 0.0]).read_text()
-    path = written(tmp_path, text.replace("</opencv_storage>", "<fisheye_model>1</fisheye_model></opencv_storage>"), "f.xml")
+    path = written(
+        tmp_path, text.replace("</opencv_storage>", "<fisheye_model>1</fisheye_model></opencv_storage>"), "f.xml"
+    )
     with pytest.raises(InputError, match=r"f.xml: fisheye_model: must be one of pinhole"):
         load_rig(path, SHAPE)
     with pytest.raises(InputError, match=r"calib.txt: camera_model: must be one of pinhole"):
@@ -132,9 +134,13 @@ def test_kalibr_is_named(tmp_path, model):
 def test_matrices_that_would_be_read_wrongly(tmp_path):
     """MATLAB's are transposed, and have other names for distortion: no distortion must not be read for these."""
     text = opencv_file(tmp_path / "rig.yml", [-0.2, 0.001, 0.0]).read_text()
-    turned = text.replace("data: [ 700., 0., 370., 0., 702., 250., 0., 0., 1. ]", "data: [ 700., 0., 0., 0., 702., 0., 370., 250., 1. ]")
+    turned = text.replace(
+        "data: [ 700., 0., 370., 0., 702., 250., 0., 0., 1. ]", "data: [ 700., 0., 0., 0., 702., 0., 370., 250., 1. ]"
+    )
     assert turned != text
-    with pytest.raises(InputError, match=r"t.yml: M1: must be \[\[fx, 0, cx\], \[0, fy, cy\], \[0, 0, 1\]\], without skew"):
+    with pytest.raises(
+        InputError, match=r"t.yml: M1: must be \[\[fx, 0, cx\], \[0, fy, cy\], \[0, 0, 1\]\], without skew"
+    ):
         load_rig(written(tmp_path, turned, "t.yml"), SHAPE)
     for name in ("RadialDistortion1", "kc_left", "dist1"):
         renamed = text.replace("D1:", f"{name}:")
