@@ -59,14 +59,16 @@ def load(model: type[M], path: str | Path) -> M:
     return parse(model, load_toml(path), file=path)
 
 
-def input_error(error: pydantic.ValidationError, *, file: str | Path | None = None) -> InputError:
-    """The first problem of a pydantic error as one line."""
+def input_error(error: pydantic.ValidationError, *, file: str | Path | None = None, prefix: str = "") -> InputError:
+    """The first problem of a pydantic error as one line; a `prefix` makes options of fields."""
     first = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in first["loc"]) or None
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
         message = "unknown key"
     value = None if first["type"] == "told" else first["input"]  # whose message says it
+    if prefix and field:
+        field = prefix + field.removeprefix("mission.").replace("_", "-")
     return InputError(message, file=file, field=field, value=value)
 
 
