@@ -126,9 +126,9 @@ def test_a_ros_map_with_a_yaw_is_planned_in_the_frame_of_the_world(tmp_path):
         return at.real, at.imag
 
     sheet = ROS.read_text()
-    assert "origin: [-1.0, -0.5, 0.0]" in sheet
+    assert "- -0.5\n- 0.0\n" in sheet
     (tmp_path / "rooms.pgm").write_bytes(ROS.with_suffix(".pgm").read_bytes())
-    (tmp_path / "turned.yaml").write_text(sheet.replace("[-1.0, -0.5, 0.0]", "[-1.0, -0.5, 1.0]"))
+    (tmp_path / "turned.yaml").write_text(sheet.replace("- -0.5\n- 0.0\n", "- -0.5\n- 1.0\n"))
     start, goal = (-0.8, 0.68), (0.75, 0.68)
     assert run(tmp_path, ROS, start, goal, out=tmp_path / "straight") == 0
     assert run(tmp_path, tmp_path / "turned.yaml", turned(*start), turned(*goal), out=tmp_path / "turned") == 0
@@ -138,7 +138,7 @@ def test_a_ros_map_with_a_yaw_is_planned_in_the_frame_of_the_world(tmp_path):
         assert turned(float(one["x_m"]), float(one["y_m"])) == pytest.approx(
             (float(other["x_m"]), float(other["y_m"])), abs=1e-5
         )
-    text = refused(tmp_path, tmp_path / "turned.yaml", start, turned(*goal), out=tmp_path / "o")
+    text = refused(tmp_path, tmp_path / "turned.yaml", (0.9, -0.4), turned(*goal), out=tmp_path / "o")
     assert (
         "start: must lie on the map, x in [-1, 1) m and y in [-0.5, 0.9) m, turned by 1 rad about (-1, -0.5) m" in text
     )
