@@ -27,8 +27,8 @@ SAME = {  # the same in other words, small letters and digits alone
 OTHER = re.compile(
     r"fish|equi|omni|mei|unified|sphere|eucm|kannala|kb4|ocam|scaramuzza|cata|panoram|cylind|prism|ftheta|^f?ov$|atan"
 )
-NAMES = re.compile(r"(camera|lens|distortion|dist|projection|intrinsics?)_?(model|type|name_of_model)|lens|projection")
-MAYBE = re.compile(r"model|type")  # may be of the camera's make, or of the file
+NAMES = re.compile(r"(camera|lens|distortion|dist|projection|intrinsics?)_?model|(distortion|projection)_?type")
+MAYBE = re.compile(r"model|type|lens|projection")  # may be of the camera's make, or of the file
 FLAGS = re.compile(r"fish_?eye|omni_?dir|equidistant|equirectangular")
 XI = re.compile(r"(.*_)?xi(_?(\d|left|right|l|r))?")  # how far off its centre an omnidirectional mirror projects
 FALSE = ("", "0", "0.0", "false", "no", "off", "none")

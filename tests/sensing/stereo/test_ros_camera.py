@@ -139,7 +139,13 @@ def test_other_lenses_are_refused_whatever_they_are_named_by(tmp_path, key, mode
 def test_names_of_the_pinhole_are_taken(tmp_path, model):
     files = cameras()
     for camera in files.values():
-        camera |= {"camera_model": model, "model": "Bumblebee 2", "camera_type": None, "distortion_model": "plumb_bob"}
+        camera |= {
+            "camera_model": model,
+            "model": "Bumblebee 2",
+            "camera_type": "Basler",
+            "lens": "6 mm",
+            "distortion_model": "plumb_bob",
+        }
     assert load_rig(written(tmp_path, files), (1, 1)).camera.baseline == pytest.approx(np.linalg.norm(TRANSLATION))
 
 
