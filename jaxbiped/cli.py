@@ -11,7 +11,7 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pydantic
 
@@ -36,6 +36,8 @@ COMMANDS = {
 }
 # What a command is when its first argument is a results folder: another module, other options.
 ON_FOLDERS = {"compare": ("stored", "StoredArgs")}
+# Options of a mission on which the defaults of other options depend.
+EARLY = ("preset", "executor", "sensor", *(f"camera.{name}" for name in ("width", "height", "columns", "rows")))
 WRONG_INPUT = 2  # exit status
 
 
@@ -80,15 +82,11 @@ def dispatch(name: str, rest: list[str]) -> int:
     extra = {}
     path = Path(rest.pop(0)) if takes_file and rest and not rest[0].startswith("-") else None
     data = load_toml(path) if path else {}
-    for option in ("preset", "executor"):
-        # They decide the defaults of other options, so that they must be known before those are read.
-        if "mission" in options.model_fields and f"--{option}" in rest[:-1]:
-            value, known = rest[rest.index(f"--{option}") + 1], options.model_fields["mission"].annotation.model_fields
-            if value in (get_args(known[option].annotation) or [value]):
-                data = data | {"mission": data.get("mission", {}) | {option: value}}
+    if "mission" in options.model_fields:
+        data = with_early(data, rest, options.model_fields["mission"].annotation)
     if data or path:
         required = {name for name, field in options.model_fields.items() if field.is_required()}
-        known = parse(options, data | dict.fromkeys(required, "-"), file=path)
+        known = defaults(options, data | dict.fromkeys(required, "-"), path)
         extra["default"] = known.model_copy(update=dict.fromkeys(required, tyro.MISSING))
     said = io.StringIO()
     try:
@@ -103,6 +101,50 @@ def dispatch(name: str, rest: list[str]) -> int:
     return module.main(args)
 
 
+def with_early(data: dict[str, Any], rest: list[str], mission: type[Model]) -> dict[str, Any]:
+    """`data` of a TOML file with those options of the mission in it that decide the defaults of others.
+
+    They must be known before the others are read: the camera's size and rays, too, for the rays of a `--preset` need
+    only go with the size that it is given. What cannot be right is left for the parser to refuse.
+    """
+    found = {}
+    for option in EARLY:
+        words = [value_of(option, word, following) for word, following in itertools.pairwise([*rest, ""])]
+        words = [word for word in words if word]
+        choices = get_args(mission.model_fields[option].annotation) if "." not in option else ()
+        if not words or (choices and words[-1] not in choices):
+            continue
+        part, _, name = option.rpartition(".")
+        if not part:
+            found[name] = words[-1]
+        elif words[-1].isascii() and words[-1].isdigit() and len(words[-1]) < 10:
+            found[part] = found.get(part, {}) | {name: int(words[-1])}
+    given = data.get("mission", {})
+    if not found or not isinstance(given, dict):
+        return data
+    merged = {name: given[name] | value if isinstance(value, dict) and isinstance(given.get(name), dict) else value
+              for name, value in found.items()}  # fmt: skip
+    return data | {"mission": given | merged}
+
+
+def value_of(option: str, word: str, following: str) -> str | None:
+    """What a word of the command line, with the one that follows it, says that the option is; None for other words."""
+    name, equals, value = word.partition("=")
+    if name.replace("_", "-") != f"--{option}":
+        return None
+    return value if equals else following
+
+
+def defaults(options: type[Model], data: dict[str, Any], path: Path | None) -> Model:
+    """What the options are by default: what the file says, or what follows from the command line alone."""
+    if path is not None:
+        return parse(options, data, file=path)
+    try:
+        return options.model_validate(data)
+    except pydantic.ValidationError as error:
+        raise input_error(error, prefix="--") from None
+
+
 def one_line(box: str) -> InputError:
     """The error that tyro draws as a box, as one line of ours: what stands between its title and its first rule.
 
@@ -112,6 +154,12 @@ def one_line(box: str) -> InputError:
     rows = itertools.dropwhile(is_rule, rows[1:])
     message = " ".join(itertools.takewhile(lambda row: not is_rule(row), rows))
     message = re.sub(r"\[/?bold\]", "", message)
+    number = re.match(
+        r"Error parsing (\S+): (invalid literal for int|could not convert string to float)[^:]*: (.*)", message
+    )
+    if number:
+        whole = "whole " * number[2].startswith("invalid")
+        return InputError(f"must be a {whole}number (got {number[3]})", field=number[1])
     model = re.match(
         r"Error parsing (\S+): .*? for \w+ (?:(?!Value error)(\S+) )?(.*?) \[type=\w+, input_value=(.*?), input_type",
         message,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import tomllib
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,6 +12,7 @@ from typing import Any, TypeVar
 import pydantic
 
 from jaxbiped.errors import InputError
+from jaxbiped.files import read_text
 
 
 class Model(pydantic.BaseModel):
@@ -24,14 +26,24 @@ M = TypeVar("M", bound=Model)
 
 def load_toml(path: str | Path) -> dict[str, Any]:
     """Read a TOML file; raise `InputError` when it is missing, no text or no TOML."""
+    text = read_text(path)
     try:
-        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("no such file", file=path) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read as text: {error}", file=path) from None
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"is not valid TOML: {error}", file=path) from None
+        message, line = toml_problem(text, str(error))
+        raise InputError(message, file=path, value=line) from None
+    except (ValueError, RecursionError):  # numbers too long, nesting too deep
+        raise InputError("is not valid TOML", file=path) from None
+
+
+def toml_problem(text: str, said: str) -> tuple[str, str]:
+    """Where and what is wrong with a text that `tomllib` refused saying `said`, in our words; and the line itself."""
+    lines = text.rstrip("\n").split("\n")
+    place = re.search(r"line (\d+), column (\d+)", said)
+    number = min(int(place[1]) if place else len(lines), len(lines))
+    where = f"line {number}, column {place[2]}" if place else f"line {number}, the last"
+    twice = ", says something a second time" if re.search("overwrite|twice|already", said) else ""
+    return f"is not valid TOML: {where}{twice}", lines[number - 1].strip()
 
 
 def parse(model: type[M], data: dict[str, Any], *, file: str | Path | None = None) -> M:
@@ -47,14 +59,16 @@ def load(model: type[M], path: str | Path) -> M:
     return parse(model, load_toml(path), file=path)
 
 
-def input_error(error: pydantic.ValidationError, *, file: str | Path | None = None) -> InputError:
-    """The first problem of a pydantic error as one line."""
+def input_error(error: pydantic.ValidationError, *, file: str | Path | None = None, prefix: str = "") -> InputError:
+    """The first problem of a pydantic error as one line; a `prefix` makes options of fields."""
     first = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in first["loc"]) or None
     message = first["msg"].removeprefix("Value error, ")
     if first["type"] == "extra_forbidden":
         message = "unknown key"
     value = None if first["type"] == "told" else first["input"]  # whose message says it
+    if prefix and field:
+        field = prefix + field.removeprefix("mission.").replace("_", "-")
     return InputError(message, file=file, field=field, value=value)
 
 

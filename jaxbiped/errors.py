@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 
 class InputError(ValueError):
     """Input that cannot be used.
@@ -23,5 +25,16 @@ class InputError(ValueError):
 
 
 def _short(value: object, limit: int = 200) -> str:
-    text = repr(value)
+    text = repr(_plain(value))
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def _plain(value: object) -> object:
+    """Scalars and arrays of NumPy as Python's own, which people read: 0.5 and not np.float64(0.5)."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if type(value) in (tuple, list):
+        return type(value)(_plain(item) for item in value)
+    if type(value) is dict:
+        return {_plain(key): _plain(item) for key, item in value.items()}
+    return value

@@ -30,7 +30,8 @@ class ClassifyArgs(ChartArgs):
     scale: Annotated[float, Field(gt=0, le=1e4)] = 1.0
     """[m] One unit of the cloud; 0.001 for millimetres."""
     up: Vector = None
-    """The direction against gravity in the cloud's frame. Default: found, z or else y or -y within 30 degrees."""
+    """The direction against gravity in the cloud's frame. Default: found, z or else y or -y within 30 degrees. Must be
+    given where a larger plane than that floor is tilted by more."""
     tilt: Annotated[float, Field(ge=0, le=60)] = 10.0
     """[deg] by which --up may be off; 0 to take it as it is."""
     floor: Annotated[Metres | None, tyro.conf.arg(metavar="FLOAT")] = None
@@ -89,7 +90,7 @@ def check_options(args: ClassifyArgs) -> None:
 
 
 def stand(cloud: Cloud, args: ClassifyArgs) -> Upright:
-    """How the cloud is set upright; raise `InputError` when it shows no floor."""
+    """How the cloud is set upright; raise `InputError` when it shows no floor, or a larger plane outside the search."""
     up = None if args.up is None else np.array(args.up) / math.hypot(*args.up)
     if args.floor is not None:
         return set_upright(up, args.floor - float(up @ cloud.origin), np.median(cloud.points, axis=0).astype(float))
@@ -99,6 +100,13 @@ def stand(cloud: Cloud, args: ClassifyArgs) -> Upright:
         size = " x ".join(f"{float(f'{side:.3g}'):g}" for side in np.ptp(cloud.points, axis=0))
         message = (
             f"shows no floor that could be found in its {size} m; give {known} (and --scale, where it is not in metres)"
+        )
+        raise InputError(message, file=args.cloud)
+    if upright.rival is not None:
+        x, y, z = (f"{v:.2f}" for v in upright.rival.up)
+        message = (
+            f"shows a larger plane than the floor that was found, tilted by more than 30 degrees; give --up X Y Z "
+            f"({x} {y} {z} where that plane is the floor)"
         )
         raise InputError(message, file=args.cloud)
     return upright

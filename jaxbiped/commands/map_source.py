@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -98,7 +99,7 @@ def kind_by_content(file: Path) -> str:
     """What the first bytes of a file say that it is."""
     try:
         with open(file, "rb") as stream:
-            head = stream.read(8)
+            head = stream.read(16).removeprefix(codecs.BOM_UTF8)
     except FileNotFoundError:
         raise InputError("no such file", file=file) from None
     except OSError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
@@ -27,6 +28,7 @@ from jaxbiped.sensing.stereo.rectify import Rig
 
 UNKNOWN_CONE = math.radians(65.0)  # of a camera that is held upright, pitched by any angle
 KNOWN_CONE = math.radians(5.0)  # that a pose from the camera file may be off
+DOUBTFUL_SHARE, DOUBTFUL_ROLL = 0.2, math.radians(20.0)  # fewer pixels that match, and more roll, are warned of
 HEIGHT_OFF = 0.15  # of the height of the camera file, or 5 cm, that the floor may be off
 
 
@@ -87,6 +89,7 @@ def main(args: StereoArgs) -> int:
     made = chart(points, args)
 
     pitch, roll = math.asin(-up[2]), math.atan2(-up[0], -up[1])
+    warn(float(disparity.valid.mean()), roll if floor and rig.pose is None else 0.0)
     nearest = camera.focal * camera.baseline / max(params.min_disparity + params.num_disparities - 1 + camera.doffs, 1)
     print(f"pair      {args.left}, {args.right}: {camera.size[0]} x {camera.size[1]} px")
     print(
@@ -123,6 +126,29 @@ def main(args: StereoArgs) -> int:
         )
     print(f"written   {out}: {', '.join(['points.ply', 'disparity.png', *names, 'stereo.json'])}")
     return 0
+
+
+def warn(matched: float, roll: float) -> None:
+    """Say on stderr what makes a map doubtful, a line each: few pixels that match, a floor that leans to the side.
+
+    A roll that the camera file says is none of them.
+
+    Args:
+      matched: share of the pixels.
+      roll: [rad] of the camera over the floor that was found.
+    """
+    if matched < DOUBTFUL_SHARE:
+        print(
+            f"jaxbiped: warning: only {matched:.1%} of the pixels match, below {DOUBTFUL_SHARE:.0%}: the map may be of "
+            "little worth; is the camera file that of this pair, is there texture and light?",
+            file=sys.stderr,
+        )
+    if abs(roll) > DOUBTFUL_ROLL:
+        print(
+            f"jaxbiped: warning: the floor that was found is rolled by {math.degrees(roll):.0f} degrees, above "
+            f"{math.degrees(DOUBTFUL_ROLL):.0f}: it may be a wall or a slope; [pose] in the camera file would tell",
+            file=sys.stderr,
+        )
 
 
 def attitude(points: np.ndarray, rig: Rig, args: StereoArgs) -> tuple[np.ndarray, float, Floor | None]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 import zipfile
 import zlib
 from dataclasses import dataclass
@@ -19,7 +21,7 @@ KEYS = ("classes", "levels", "origin_xy", "pitch")
 
 @dataclass(frozen=True)
 class ClassGrid:
-    """One map on the host, in NumPy. Row i is along y, column j along x.
+    """One map on the host, in NumPy. Row i is along y, column j along x; the grid may be turned in its frame.
 
     Raises:
       InputError: a field with a wrong shape, type or value.
@@ -29,9 +31,12 @@ class ClassGrid:
     levels: Int8[np.ndarray, "H W"]  # level of the ground, in steps
     origin_xy: Float64[np.ndarray, "2"]  # [m] outer corner of cell (0, 0)
     pitch: float  # [m] side of a cell
+    yaw: float = 0.0  # [rad] of the grid's axes, about `origin_xy`; the file holds none
 
     def __post_init__(self):
-        check(vars(self))
+        check({key: getattr(self, key) for key in KEYS})
+        if not math.isfinite(self.yaw):
+            raise InputError("must be finite", field="yaw", value=self.yaw)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -40,9 +45,15 @@ class ClassGrid:
 
     @property
     def extent(self) -> tuple[float, float, float, float]:
-        """(least x, greatest x, least y, greatest y) [m] of the outer border."""
+        """(least x, greatest x, least y, greatest y) [m] of the outer border, before the grid is turned."""
         (x, y), (rows, columns) = self.origin_xy, self.shape
         return float(x), float(x + columns * self.pitch), float(y), float(y + rows * self.pitch)
+
+    @property
+    def axes(self) -> Float64[np.ndarray, "2 2"]:
+        """Unit vectors along x and y of the grid, as columns."""
+        cos, sin = (math.cos(self.yaw), math.sin(self.yaw)) if self.yaw else (1.0, 0.0)
+        return np.array([[cos, -sin], [sin, cos]])
 
     def cell_at(self, xy: tuple[float, float], field: str = "xy", file: Path | None = None) -> tuple[int, int]:
         """Row and column (i, j) of the cell that holds the point `xy` [m].
@@ -53,15 +64,18 @@ class ClassGrid:
           InputError: the point is outside the map, or not a number; `field` and `file` name it.
         """
         x0, x1, y0, y1 = self.extent
-        if not (x0 <= xy[0] < x1 and y0 <= xy[1] < y1):
-            allowed = f"must lie on the map, x in [{x0:g}, {x1:g}) m and y in [{y0:g}, {y1:g}) m"
+        x, y = self.origin_xy + self.axes.T @ (np.asarray(xy, float) - self.origin_xy) if self.yaw else xy
+        if not (x0 <= x < x1 and y0 <= y < y1):
+            turned = f", turned by {self.yaw:g} rad about ({x0:g}, {y0:g}) m" if self.yaw else ""
+            allowed = f"must lie on the map, x in [{x0:g}, {x1:g}) m and y in [{y0:g}, {y1:g}) m{turned}"
             raise InputError(allowed, file=file, field=field, value=tuple(map(float, xy)))
-        j, i = (int(steps) for steps in np.floor((np.asarray(xy, float) - self.origin_xy) / self.pitch))
+        j, i = (int(steps) for steps in np.floor((np.array([x, y], float) - self.origin_xy) / self.pitch))
         return min(i, self.shape[0] - 1), min(j, self.shape[1] - 1)  # rounding may lift a point by one ulp
 
     def centres_xy(self, cells_ij: Int[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
         """Centres [m] of cells (i, j), as (x, y)."""
-        return self.origin_xy + (np.asarray(cells_ij)[:, ::-1] + 0.5) * self.pitch
+        along = (np.asarray(cells_ij)[:, ::-1] + 0.5) * self.pitch
+        return self.origin_xy + along @ self.axes.T
 
 
 def check(fields: dict[str, object], file: str | Path | None = None) -> None:
@@ -107,9 +121,24 @@ def outline(value: object) -> object:
 
 
 def save(grid: ClassGrid, path: str | Path) -> None:
-    """Write `grid` to the `.npz` file `path`, whole or not at all; raise `InputError` when that fails."""
+    """Write `grid` to the `.npz` file `path`, whole or not at all; raise `InputError` when that fails.
+
+    A grid that is turned is refused: the file has no place for its yaw.
+    """
+    if grid.yaw:
+        raise InputError("must be 0 in a class grid file", file=path, field="yaw", value=grid.yaw)
     arrays = {key: np.asarray(getattr(grid, key)) for key in KEYS}
     write_whole(path, lambda file: np.savez_compressed(file, **arrays))
+
+
+def read_arrays(path: str | Path) -> dict[str, np.ndarray | None]:
+    """The arrays of an `.npz` under `KEYS`, and the first other key as None; raises what NumPy raises."""
+    with open(path, "rb") as file:
+        archive = np.load(file, allow_pickle=False)
+        if isinstance(archive, np.ndarray):
+            raise InputError("must be an .npz class grid, not a single array", file=path)
+        names = [name for name in archive.files if name in KEYS] + [n for n in archive.files if n not in KEYS][:1]
+        return {name: archive[name] if name in KEYS else None for name in names}
 
 
 def load(path: str | Path) -> ClassGrid:
@@ -120,12 +149,9 @@ def load(path: str | Path) -> ClassGrid:
         missing or unknown, wrong shapes, types or values.
     """
     try:
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            raise InputError("must be an .npz class grid, not a single array", file=path)
-        with loaded as archive:
-            names = [name for name in archive.files if name in KEYS] + [n for n in archive.files if n not in KEYS][:1]
-            fields = {name: archive[name] if name in KEYS else None for name in names}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of odd headers; what they hold is checked below
+            fields = read_arrays(path)
     except FileNotFoundError:
         raise InputError("no such file", file=path) from None
     except InputError:
@@ -135,7 +161,7 @@ def load(path: str | Path) -> ClassGrid:
     except ValueError as error:
         what = "holds pickled objects, which are refused" if "pickle" in str(error) else "is no .npz class grid"
         raise InputError(what, file=path) from None
-    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, NotImplementedError, SyntaxError) as error:
-        raise InputError(f"is no .npz class grid, or was cut short: {error}", file=path) from None
+    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, NotImplementedError, SyntaxError):
+        raise InputError("is no .npz class grid, or was cut short", file=path) from None
     check(fields, file=path)
     return ClassGrid(fields["classes"], fields["levels"], fields["origin_xy"].astype(float), float(fields["pitch"]))

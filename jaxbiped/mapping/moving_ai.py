@@ -12,6 +12,7 @@ and even within trees. A robot that walks has no business there: both are obstac
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +20,7 @@ import numpy as np
 from jaxtyping import Float64, Int
 
 from jaxbiped.errors import InputError
-from jaxbiped.files import reason
+from jaxbiped.files import read_text
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 
@@ -33,6 +34,8 @@ TERRAIN = {
     "W": Cell.OBSTACLE,  # water
 }
 LARGEST_SIDE = 1 << 16  # [cells]; a header beyond this is damage, not a map
+HEADER = (["type"], ["height"], ["width"])
+HEADER_LINES = 20  # within which the word 'map' stands, after comments and blank lines
 
 
 @dataclass(frozen=True)
@@ -58,49 +61,58 @@ def load_map(path: str | Path, pitch: float = 0.05) -> ClassGrid:
         character, a pitch that is not above 0.
     """
     lines = read_lines(path)
-    head = dict(line.split(maxsplit=1) for line in lines[:3] if len(line.split(maxsplit=1)) == 2)
-    if head.get("type") != "octile":
-        raise InputError(
-            "must be a Moving AI map, whose first line is 'type octile'", file=path, value=(lines or [""])[0]
-        )
+    start = lines.index("map") if "map" in lines[:HEADER_LINES] else None
+    head = dict(line.split(maxsplit=1) for line in lines[:start][:HEADER_LINES] if len(line.split()) == 2)
+    if "type" not in head and not {"height", "width"} <= head.keys():
+        first = lines[0] if lines else ""
+        raise InputError("must be a Moving AI map, whose first line is 'type octile'", file=path, value=first)
+    if head.get("type", "octile") != "octile":
+        raise InputError("must be octile: maps of other types are not supported", file=path, field="type",
+                         value=head["type"])  # fmt: skip
     height, width = (side(head.get(key), path, key) for key in ("height", "width"))
-    if len(lines) < 4 or lines[3] != "map":
-        raise InputError("must be the word 'map'", file=path, field="line 4", value=lines[3] if len(lines) > 3 else "")
-    rows = lines[4:]
+    if start is None:
+        place = next((k for k, line in enumerate(lines) if line.split()[:1] not in HEADER), len(lines))
+        value = lines[place] if place < len(lines) else ""
+        raise InputError("must be the word 'map'", file=path, field=f"line {place + 1}", value=value)
+    rows = lines[start + 1 :]
     if len(rows) != height:
         raise InputError(f"must hold {height} rows, as its header says", file=path, field="map", value=len(rows))
-    for i, row in enumerate(rows):
+    for i, row in enumerate(rows, start=start + 2):
         if len(row) != width:
             message = f"must be {width} characters long, as the header says"
-            raise InputError(message, file=path, field=f"line {i + 5}", value=len(row))
+            raise InputError(message, file=path, field=f"line {i}", value=len(row))
     cell_of = np.full(256, -1, np.int8)
     for character, cell in TERRAIN.items():
         cell_of[ord(character)] = cell
-    characters = np.frombuffer("".join(rows).encode("latin-1"), np.uint8).reshape(height, width)
+    characters = np.frombuffer("".join(rows).encode("latin-1", "replace"), np.uint8).reshape(height, width)
     classes = cell_of[characters]
     wrong = np.argwhere(classes < 0)
     if len(wrong):
         i, j = wrong[0]
-        field = f"line {i + 5}, column {j + 1}"
+        field = f"line {i + start + 2}, column {j + 1}"
         raise InputError(f"must be one of {' '.join(TERRAIN)}", file=path, field=field, value=rows[i][j])
     return ClassGrid(classes, np.zeros_like(classes), np.zeros(2), float(pitch))
 
 
 def load_scenario(path: str | Path, grid: ClassGrid) -> Scenario:
-    """Read a `.scen` file of version 1 that belongs to the map `grid`.
+    """Read a `.scen` file of version 1, or 0, that belongs to the map `grid`.
 
     Raises:
       InputError: no such file, another version, a line that is cut short or no query, a map of another size, a
         position outside the map, a negative or infinite length, no query at all.
     """
     lines = read_lines(path)
-    words = lines[0].split() if lines else []
-    if len(words) != 2 or words[0] != "version" or words[1] not in ("1", "1.0"):
-        raise InputError("must begin with 'version 1'", file=path, field="line 1", value=lines[0] if lines else "")
-    numbered = [(number, line) for number, line in enumerate(lines[1:], start=2) if line.strip()]
+    first, *rest = lines or [""]
+    words = first.split()
+    says = words[:1] == ["version"]
+    if not says:  # files of version 0 do not say so, nor need they say how large their map is
+        rest = lines
+    elif words[1:] not in (["1"], ["1.0"]):
+        raise InputError("must begin with 'version 1'", file=path, field="line 1", value=first)
+    numbered = [(k, line) for k, line in enumerate(rest, start=len(lines) - len(rest) + 1) if line]
     if not numbered:
         raise InputError("must hold at least one query", file=path)
-    queries = [query(line, grid.shape, path, f"line {number}") for number, line in numbered]
+    queries = [query(line, grid.shape, path, f"line {number}", sized=says) for number, line in numbered]
     bucket, start_ij, goal_ij, optimal, texts = zip(*queries, strict=True)
     return Scenario(
         np.array(bucket), np.array(start_ij), np.array(goal_ij), np.array(optimal), rounding(np.array(optimal), texts)
@@ -108,10 +120,15 @@ def load_scenario(path: str | Path, grid: ClassGrid) -> Scenario:
 
 
 def query(
-    line: str, shape: tuple[int, int], path: str | Path, field: str
+    line: str, shape: tuple[int, int], path: str | Path, field: str, sized: bool
 ) -> tuple[int, tuple[int, int], tuple[int, int], float, str]:
-    """One line of a scenario: bucket, start (i, j), goal (i, j), length, and the length as written."""
-    words = line.split("\t") if "\t" in line else line.split()
+    """One line of a scenario: bucket, start (i, j), goal (i, j), length, and the length as written.
+
+    The size of the map may be missing unless it must be `sized`.
+    """
+    words = re.split("\t" if "\t" in line else " +", line)  # the map's name may hold any other character
+    if not sized and len(words) == 7:
+        words[2:2] = str(shape[1]), str(shape[0])
     allowed = "must hold bucket, map, width, height, start x, start y, goal x, goal y, optimal length"
     try:
         bucket, _, width, height, start_x, start_y, goal_x, goal_y, text = words
@@ -149,20 +166,15 @@ def rounding(lengths: Float64[np.ndarray, "Q"], texts: tuple[str, ...]) -> Float
 
 def side(text: str | None, path: str | Path, field: str) -> int:
     """A height or a width of the header."""
-    if text is None or not text.isascii() or not text.isdigit() or not 1 <= int(text) <= LARGEST_SIDE:
+    if text is None or not re.fullmatch("[0-9]{1,9}", text) or not 1 <= int(text) <= LARGEST_SIDE:
         message = f"must be a whole number of cells from 1 to {LARGEST_SIDE}"
         raise InputError(message, file=path, field=field, value=text or "")
     return int(text)
 
 
 def read_lines(path: str | Path) -> list[str]:
-    """The lines of a text file, without their ends and without empty lines at the end of the file."""
-    try:
-        lines = Path(path).read_bytes().decode("latin-1").splitlines()
-    except FileNotFoundError:
-        raise InputError("no such file", file=path) from None
-    except OSError as error:
-        raise InputError(f"cannot be read: {reason(error)}", file=path) from None
-    while lines and not lines[-1].strip():
+    """The lines of a text file, without spaces and tabs after them and without empty lines at the end of the file."""
+    lines = [line.rstrip(" \t") for line in read_text(path, otherwise="latin-1").split("\n")]
+    while lines and not lines[-1]:
         lines.pop()
     return lines

@@ -9,43 +9,51 @@ Modes: `trinary` is the rule above. `scale` grades what lies between the thresho
 opaque as unknown; a class has no grades, so both are unmeasured. `raw` takes the pixel itself (after `negate`) as an
 occupancy in percent, unknown above 100; the thresholds then apply to it.
 
-Deviations: colour pictures are refused (`map_server` averages the channels: a photograph would become a map), and so
-are maps with a yaw, which this grid cannot hold. Alpha matters in `scale` only, as documented (the code of
-`map_server` averages it into the grey of the other modes).
+The origin is the pose of the lower left corner; with a yaw the grid lies turned about it (`ClassGrid.yaw`). Keys that
+`map_server` does not know, such as `map_type` and `frame_id`, are ignored as it ignores them.
+
+Deviations: colour pictures are refused (`map_server` averages the channels: a photograph would become a map). Alpha
+matters in `scale` only, as documented (the code of `map_server` averages it into the grey of the other modes).
 """
 
 from __future__ import annotations
 
-import struct
+import io
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import yaml
+import pydantic
 from jaxtyping import Bool, Int8, UInt8
 from PIL import Image, UnidentifiedImageError
 from pydantic import Field, model_validator
 
 from jaxbiped.config import Model, parse
 from jaxbiped.errors import InputError
-from jaxbiped.files import reason
+from jaxbiped.files import read_yaml, reason
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.sensing.image_depth import no_chatter, sample_bits
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 PICTURES = (".png", ".pgm")
 SHEETS = (".yaml", ".yml")
+LEAST_TURN = 1e-3  # [cells] at the far end of the map; less is the rounding of whoever computed the yaw
+ORIENTATION = 0x0112  # the EXIF tag
 
 
 class RosMap(Model):
     """The YAML file of a map."""
+
+    model_config = pydantic.ConfigDict(extra="ignore")
 
     image: str
     """The picture, absolute or from the YAML file's folder."""
     resolution: Annotated[float, Field(gt=0)]
     """[m] side of a pixel."""
     origin: tuple[float, float, float]
-    """[m, m, rad] x, y of the lower left corner, and yaw, which must be 0."""
+    """[m, m, rad] x, y of the lower left corner, and yaw."""
     negate: bool
     """Whether white is occupied and black free."""
     occupied_thresh: Fraction
@@ -61,10 +69,6 @@ class RosMap(Model):
             raise ValueError(
                 f"free_thresh {self.free_thresh:g} must not be above occupied_thresh {self.occupied_thresh:g}"
             )
-        if self.origin[2] != 0:
-            raise ValueError(
-                f"origin's yaw must be 0, since the grid's axes are the map's (it is {self.origin[2]:g} rad)"
-            )
         return self
 
 
@@ -72,15 +76,18 @@ def load(path: str | Path) -> ClassGrid:
     """Read a map by its YAML file, or by its picture with a YAML file of the same stem beside it; all on level 0.
 
     Raises:
-      InputError: no such file, no YAML beside the picture, unknown or missing keys, values out of range, a picture that
+      InputError: no such file, no YAML beside the picture, missing keys, values out of range, a picture that
         is cut short, damaged, empty, in colour, of more than 8 bits or neither PNG nor PGM.
     """
     path = Path(path)
     sheet = path if path.suffix.lower() in SHEETS else sheet_beside(path)
-    fields = parse(RosMap, read_yaml(sheet), file=sheet)
+    fields = parse(RosMap, read_fields(sheet), file=sheet)
     grey, opaque = read_picture(sheet.parent / fields.image)
     classes = classify(grey, opaque, fields)
-    return ClassGrid(classes, np.zeros_like(classes), np.array(fields.origin[:2]), fields.resolution)
+    x, y, yaw = fields.origin
+    yaw = math.remainder(yaw, 2 * math.pi)
+    yaw = yaw if abs(yaw) * max(classes.shape) > LEAST_TURN else 0.0
+    return ClassGrid(classes, np.zeros_like(classes), np.array([x, y]), fields.resolution, yaw)
 
 
 def classify(
@@ -110,37 +117,37 @@ def classify(
 def read_picture(path: Path) -> tuple[UInt8[np.ndarray, "H W"], Bool[np.ndarray, "H W"]]:
     """Grey values of a PNG or PGM, and where it is opaque; raise `InputError` when it is no map."""
     try:
-        with Image.open(path, formats=("PNG", "PPM")) as image:
+        data = path.read_bytes()
+        with no_chatter(), Image.open(io.BytesIO(data), formats=("PNG", "PPM")) as image:
             image.load()
-            deep, picture = image.mode in ("I", "F") or image.mode.startswith("I;"), image.convert("RGBA")
+            deep = sample_bits(data) > 8 or image.mode in ("I", "F") or image.mode.startswith("I;")
+            turned = image.getexif().get(ORIENTATION, 1)
+            picture = image.convert("RGBA")
     except FileNotFoundError:
         raise InputError("no such picture", file=path) from None
     except UnidentifiedImageError:
         raise InputError("must be a PNG or PGM picture", file=path) from None
-    except (OSError, ValueError, SyntaxError, EOFError, struct.error, Image.DecompressionBombError) as error:
-        what = reason(error) if isinstance(error, OSError) else str(error)
-        raise InputError(f"is damaged or cut short: {what}", file=path) from None
+    except Exception as error:  # Pillow raises whatever a damaged picture makes it trip over
+        if isinstance(error, OSError) and error.errno:
+            raise InputError(f"cannot be read: {reason(error)}", file=path) from None
+        raise InputError("is damaged or cut short", file=path) from None
     if deep:
-        raise InputError("must have 8 bits a pixel", file=path, value=f"mode {image.mode}")
+        raise InputError("must have 8 bits a pixel and channel, and this picture has more", file=path)
+    if turned != 1:
+        message = "must be upright as it is stored: map_server does not turn pictures by their EXIF orientation"
+        raise InputError(message, file=path, value=turned)
     red, green, blue, alpha = np.moveaxis(np.asarray(picture), -1, 0)
     if not (np.array_equal(red, green) and np.array_equal(red, blue)):
         raise InputError("must be a grey map, and this picture is in colour", file=path)
     return red, alpha == 255
 
 
-def read_yaml(path: Path) -> dict[str, object]:
+def read_fields(path: Path) -> dict[str, object]:
     """The mapping that a YAML file holds; raise `InputError` when it holds none."""
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError("no such file", file=path) from None
-    except OSError as error:
-        raise InputError(f"cannot be read: {reason(error)}", file=path) from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise InputError(f"is not valid YAML: {error}", file=path) from None
+    data = read_yaml(path)
     if not isinstance(data, dict):
         raise InputError("must hold the fields of a map_server map (image, resolution, origin, ...)", file=path)
-    return data
+    return {str(key): value for key, value in data.items()}
 
 
 def sheet_beside(picture: Path) -> Path:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from jaxbiped.mapping.floor import Floor, find_floor
+from jaxbiped.mapping.floor import INLIERS, Floor, find_floor
 
 # Rotations of clouds whose frame has another axis up, to x forward, y left, z up; rows are the new axes.
 FRAMES = {
@@ -21,6 +21,8 @@ FRAMES = {
 }
 LIKELY = {"z": 1.0, "-y": 0.5, "y": 0.5}  # frames that are tried where nothing is known, and what a floor counts there
 CONE = math.radians(30.0)  # that up may be off an axis of the frame, where nothing is known
+RIVAL_CONE = math.radians(60.0)  # off the floor, within which another plane may be the true one; steeper, it is a wall
+SAMPLE = 100_000  # points that are counted on two planes
 
 
 @dataclass(frozen=True)
@@ -32,6 +34,7 @@ class Upright:
     floor: Floor | None  # as it was found, in the frame of the cloud; None where it was given
     frame: str  # the axis of the cloud's frame that points up, or nearly
     height: float  # [m] of the floor along that axis, at the pivot
+    rival: Floor | None = None  # a plane that holds more points, but is too steep to have been looked for
 
     def apply(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
         """Points [m] in the frame of the map, of the same type."""
@@ -85,6 +88,9 @@ def find_upright(
       up: direction against gravity, off by up to `tilt` [rad]; 0 takes it as it is. None: z, -y (a camera's frame) or
         y (of graphics) is up within 30 degrees, whichever shows the greatest floor; z counts twice.
       how: further arguments of `find_floor`.
+
+    Where nothing was known, a plane that is more than 30 degrees off all of these axes, holds more points than the
+    floor and has as little below it is returned as the `rival`: then up must be said.
     """
     if not len(points):
         return None
@@ -97,4 +103,16 @@ def find_upright(
     if floor is None:
         return None
     pivot = np.median(points[:: max(1, len(points) // 10_000)], axis=0).astype(float)
-    return set_upright(floor.up, floor.offset, pivot, floor)
+    upright = set_upright(floor.up, floor.offset, pivot, floor)
+    return upright if up is not None else replace(upright, rival=find_rival(points, floor, **how))
+
+
+def find_rival(points: Float[np.ndarray, "N 3"], floor: Floor, **how) -> Floor | None:
+    """A plane steeper than `find_upright` looks at that holds more points than `floor`, or None."""
+    rival = find_floor(points, floor.up, RIVAL_CONE, **how)
+    if rival is None or max(float(FRAMES[name][2] @ rival.up) for name in LIKELY) >= math.cos(CONE):
+        return None
+    some = np.asarray(points[:: max(1, len(points) // SAMPLE)], float)
+    near = max(INLIERS[0], 2 * rival.spread)
+    held, more = (int((np.abs(some @ plane.up - plane.offset) < near).sum()) for plane in (floor, rival))
+    return rival if more > held else None

@@ -84,8 +84,8 @@ def load_log(path: str | Path) -> tuple[MissionLog, dict[str, Any]]:
         raise InputError(f"this version reads logs of format {FORMAT}", file=path, field="format", value=found)
     try:
         return to_log(header, arrays), header["facts"]
-    except (KeyError, TypeError, ValueError, OSError) as error:
-        raise InputError(f"is a damaged log of a mission: {error}", file=path) from None
+    except (KeyError, TypeError, ValueError, OSError):
+        raise InputError("is a damaged log of a mission", file=path) from None
 
 
 def to_log(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> MissionLog:

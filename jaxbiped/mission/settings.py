@@ -84,7 +84,8 @@ class MissionConfig(Model):
     """`stereo`: pairs of pictures, rendered and matched on the host."""
     preset: str = "rendered"
     """How well the camera measures, the default of each number of `stereo` and `landmarks`: ideal, rendered, real, or a
-    sensor file (.toml), as `jaxbiped fit-sensor` writes it, which says how many rays the camera has, too."""
+    sensor file (.toml), as `jaxbiped fit-sensor` writes it, which says how many rays the camera has, too. What is given
+    beside it wins; the rays need only divide the camera's size as it then is."""
     executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
     """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
     MuJoCo's own batch or in MJX."""

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.transforms import Affine2D
 
 from jaxbiped.arenas.arena import DISC_RADIUS, SQUARE_SIDE
 from jaxbiped.files import write_whole
@@ -84,7 +85,10 @@ def draw_map(
     """
     k = axis.per_metre
     x0, x1, y0, y1 = (value * k for value in grid.extent)
-    ax.imshow(class_image(grid.classes, grid.levels), origin="lower", extent=(x0, x1, y0, y1), interpolation="nearest")
+    turn = turned(grid, k)
+    image = class_image(grid.classes, grid.levels)
+    style = {"origin": "lower", "interpolation": "nearest", "transform": turn + ax.transData}
+    ax.imshow(image, extent=(x0, x1, y0, y1), **style)
     small = grid.classes.size <= MOST_CELLS_LINED
     if small:
         draw_lines(ax, grid, k)
@@ -102,14 +106,22 @@ def draw_map(
         ax.plot(start_xy[0] * k, start_xy[1] * k, "o", ms=8, mfc="white", mec=INK, mew=1.6, zorder=7)
     if goal_xy is not None:
         draw_goal(ax, goal_xy, goal_radius if small else None, k)
+    corners = turn.transform([(x0, y0), (x1, y0), (x0, y1), (x1, y1)])
+    (x0, y0), (x1, y1) = corners.min(0), corners.max(0)
     frame(ax, (x0, x1, y0, y1), axis)
+
+
+def turned(grid: ClassGrid, k: float) -> Affine2D:
+    """From the axes of a grid, in units of which a metre has `k`, to those of its frame, in which it may lie turned."""
+    x0, _, y0, _ = (value * k for value in grid.extent)
+    return Affine2D().rotate_around(x0, y0, grid.yaw)
 
 
 def draw_lines(ax: Axes, grid: ClassGrid, k: float) -> None:
     """Thin lines between cells."""
     rows, columns = grid.shape
     x0, x1, y0, y1 = (value * k for value in grid.extent)
-    style = {"color": "#606060", "lw": 0.4, "alpha": 0.22, "zorder": 1}
+    style = {"color": "#606060", "lw": 0.4, "alpha": 0.22, "zorder": 1, "transform": turned(grid, k) + ax.transData}
     ax.vlines(np.linspace(x0, x1, columns + 1)[1:-1], y0, y1, **style)
     ax.hlines(np.linspace(y0, y1, rows + 1)[1:-1], x0, x1, **style)
 

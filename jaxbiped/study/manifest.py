@@ -71,8 +71,8 @@ def read_manifest(folder: str | Path) -> Manifest:
         data = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise InputError(f"is not a results folder; it has no {MANIFEST}", file=folder) from None
-    except UNREADABLE as error:
-        raise InputError(f"is not valid JSON: {error}", file=path) from None
+    except UNREADABLE:
+        raise InputError("is not valid JSON", file=path) from None
     found = data.get("format") if isinstance(data, dict) else None
     if found != FORMAT:
         raise InputError(f"this version reads manifests of format {FORMAT}", file=path, field="format", value=found)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import subprocess
 import sys
@@ -148,6 +149,43 @@ def test_what_is_refused(tmp_path):
     assert refused(tmp_path, area=(1.0, 0.0, 0.0, 1.0)).startswith("area: must be finite, X0 < X1 and Y0 < Y1")
     (tmp_path / "out").mkdir()
     assert refused(tmp_path).startswith("out: must be a folder that does not exist yet")
+
+
+def tilted_table(degrees, noise=0.0007, seed=3):
+    """A table of 0.8 x 0.6 m with two boxes on it and a strip of a wall behind, as a camera with y up sees them."""
+    rng = np.random.default_rng(seed)
+
+    def face(low, high, n):
+        return rng.uniform(low, high, (n, 3))
+
+    parts = [face((0, 0, 0), (0.8, 0.6, 0), 12_000)]
+    for x in (0.15, 0.5):
+        parts += [face((x, 0.2, 0), (x, 0.4, 0.15), 1_500), face((x, 0.2, 0.15), (x + 0.15, 0.4, 0.15), 1_500)]
+    parts += [face((0, 0.75, -0.3), (0.8, 0.75, 0.5), 2_000)]
+    points = np.concatenate(parts)
+    points += noise * rng.normal(size=points.shape)
+    turn = Rotation.from_euler("x", degrees, degrees=True).as_matrix()
+    return (points @ turn.T) @ FRAMES["y"]
+
+
+def test_a_larger_plane_outside_the_search_is_refused_with_up_named(tmp_path, capsys):
+    """Of a table tilted by more than the search allows, no slanted cut through what stands on it is the floor."""
+    points = tilted_table(38.0)
+    text = refused(tmp_path, points, pitch=0.02)
+    assert "cloud.npz: shows a larger plane than the floor that was found, tilted by more than 30 degrees" in text
+    up = tuple(float(v) for v in re.search(r"give --up X Y Z \((\S+) (\S+) (\S+) where", text).groups())
+    run(tmp_path, points, pitch=0.02, up=up)
+    assert "y is up but for 38.0" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("degrees", [33.0, 50.0])
+def test_other_tilts_beyond_the_search_name_up_as_well(tmp_path, degrees):
+    assert "give --up X Y Z" in refused(tmp_path, tilted_table(degrees), pitch=0.02)
+
+
+def test_a_tilt_within_the_search_needs_no_up(tmp_path, capsys):
+    run(tmp_path, tilted_table(25.0), pitch=0.02)
+    assert "found: y is up but for 24.9" in capsys.readouterr().out
 
 
 def test_one_point_is_no_floor(tmp_path):

@@ -7,6 +7,9 @@ import polars as pl
 import pytest
 
 from jaxbiped import cli, files
+from jaxbiped.commands import compare, run
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.study.schema import SCHEMA
 
@@ -38,7 +41,10 @@ def refused(capsys, *argv: str) -> str:
         (["run", SCENE, "--strategy", "brave"], ["--strategy", "brave", "floor_only"]),
         (["run", SCENE, "--costs.c1", "-4"], ["--costs.c1", "greater than or equal to 0", "-4"]),
         (["run", SCENE, "--costs.c1", "nan"], ["--costs.c1", "finite", "nan"]),
-        (["run", SCENE, "--costs.c1", "cheap"], ["--costs.c1", "cheap"]),
+        (["run", SCENE, "--costs.c1", "cheap"], ["--costs.c1: must be a number (got 'cheap')"]),
+        (["run", SCENE, "--camera.width", "wide"], ["--camera.width: must be a whole number (got 'wide')"]),
+        (["run", SCENE, "--preset", "best"], ["--preset: must be one of ideal, rendered, real or a .toml file"]),
+        (["run", SCENE, "--preset"], ["Missing value", "--preset"]),
         (["run", SCENE, "--seed", "-1"], ["--seed", "greater than or equal to 0"]),
         (["run", SCENE, "--pitch", "0.03"], ["pitch", "must divide", "0.03"]),
         (["run", SCENE, "--robot.standing", "0.2"], ["--robot", "must rise"]),
@@ -71,6 +77,60 @@ def test_options(here, capsys, argv, said):
     line = refused(capsys, *argv)
     assert all(part in line for part in said), line
     assert sorted(path.name for path in here.iterdir()) == ["configs"]
+
+
+@pytest.fixture
+def mission_of(monkeypatch):
+    """The options that a command line is read as, without the command."""
+    taken = []
+    monkeypatch.setattr(run, "main", lambda args: taken.append(args) or 0)
+    monkeypatch.setattr(compare, "main", lambda args: taken.append(args) or 0)
+
+    def mission_of(*argv):
+        assert cli.main(argv) == 0
+        return taken[-1].mission
+
+    return mission_of
+
+
+RAYS = "[rays]\ncolumns = 80\nrows = 60\n[stereo]\nsd = 0.3\n"
+
+
+@pytest.mark.parametrize("join", [False, True])
+def test_a_preset_with_rays_and_a_camera_go_together_as_in_toml(here, capsys, mission_of, join):
+    """The rays of a preset need only divide the camera's size as it is given; what is given beside the preset wins."""
+    (here / "rays.toml").write_text(RAYS)
+
+    def words(**options):
+        pairs = [(f"--{name.replace('_', '.', 1)}", value) for name, value in options.items()]
+        return [f"{name}={value}" for name, value in pairs] if join else [word for pair in pairs for word in pair]
+
+    for given in ({"width": 640, "height": 480}, {"width": 800, "height": 600, "rows": 30}):
+        options = {f"camera_{name}": str(value) for name, value in given.items()}
+        on_line = mission_of("run", SCENE, *words(**options, preset="rays.toml"))
+        table = ", ".join(f"{name} = {value}" for name, value in given.items())
+        (here / "study.toml").write_text(f"[mission]\npreset = 'rays.toml'\ncamera = {{ {table} }}\n")
+        in_file = mission_of("compare", "study.toml")
+        assert on_line == in_file == mission_of("compare", "study.toml", *words(**options))
+        camera = on_line.camera.model_dump()
+        assert camera == CameraConfig(**{"columns": 80, "rows": 60} | given).model_dump() and on_line.stereo.sd == 0.3
+    line = refused(capsys, "run", SCENE, *words(preset="rays.toml"))
+    assert "--camera: columns must divide the width of 512, got 80" in line
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "part", "name"),
+    [
+        ("preset", "real", "stereo", "sd"),
+        ("executor", "sampled", "robot", "radius"),
+        ("sensor", "stereo", "mapping", "below_points"),
+    ],
+)
+def test_options_that_decide_defaults_do_so_in_both_spellings(here, mission_of, option, value, part, name):
+    expected = getattr(getattr(MissionConfig(**{option: value}), part), name)
+    assert expected != getattr(getattr(MissionConfig(), part), name)
+    for words in ([f"--{option}", value], [f"--{option}={value}"]):
+        assert getattr(getattr(mission_of("run", SCENE, *words), part), name) == expected, words
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,33 @@ def test_a_ros_map_is_planned_in_metres_by_yaml_and_by_picture(tmp_path):
     assert float(costs[0]) == pytest.approx(dijkstra(graph(free), directed=False, indices=start)[goal], rel=1e-6)
 
 
+def test_a_ros_map_with_a_yaw_is_planned_in_the_frame_of_the_world(tmp_path):
+    """The same way as without, each of its points turned about the origin of the map; and the picture is turned."""
+    turn = complex(math.cos(1.0), math.sin(1.0))
+
+    def turned(x, y):
+        at = complex(-1.0, -0.5) + turn * (complex(x, y) - complex(-1.0, -0.5))
+        return at.real, at.imag
+
+    sheet = ROS.read_text()
+    assert "- -0.5\n- 0.0\n" in sheet
+    (tmp_path / "rooms.pgm").write_bytes(ROS.with_suffix(".pgm").read_bytes())
+    (tmp_path / "turned.yaml").write_text(sheet.replace("- -0.5\n- 0.0\n", "- -0.5\n- 1.0\n"))
+    start, goal = (-0.8, 0.68), (0.75, 0.68)
+    assert run(tmp_path, ROS, start, goal, out=tmp_path / "straight") == 0
+    assert run(tmp_path, tmp_path / "turned.yaml", turned(*start), turned(*goal), out=tmp_path / "turned") == 0
+    ways = [read_csv(tmp_path / name) for name in ("straight", "turned")]
+    assert [row["row"] for row in ways[0]] == [row["row"] for row in ways[1]]
+    for one, other in zip(*ways, strict=True):
+        assert turned(float(one["x_m"]), float(one["y_m"])) == pytest.approx(
+            (float(other["x_m"]), float(other["y_m"])), abs=1e-5
+        )
+    text = refused(tmp_path, tmp_path / "turned.yaml", (0.9, -0.4), turned(*goal), out=tmp_path / "o")
+    assert (
+        "start: must lie on the map, x in [-1, 1) m and y in [-0.5, 0.9) m, turned by 1 rad about (-1, -0.5) m" in text
+    )
+
+
 def test_the_suffix_may_lie(bumpy, tmp_path):
     other = tmp_path / "grid.dat"
     other.write_bytes(bumpy.read_bytes())

@@ -1,6 +1,7 @@
 """`jaxbiped stereo` on the motorcycle pair, on to `plan`, and every way it refuses."""
 
 import json
+import math
 import os
 from pathlib import Path
 
@@ -164,6 +165,37 @@ def cropped(pair, tmp_path, rows):
         with Image.open(path) as image:
             image.crop((0, rows.start, image.width, rows.stop)).save(paths[-1])
     return paths
+
+
+def test_few_matches_and_a_leaning_floor_are_warned_of(capsys):
+    """One line each, on stderr."""
+    stereo.warn(0.2, math.radians(20))
+    assert capsys.readouterr() == ("", "")
+    stereo.warn(0.199, math.radians(-20.1))
+    first, second = capsys.readouterr().err.splitlines()
+    assert first.startswith(
+        "jaxbiped: warning: only 19.9% of the pixels match, below 20%: the map may be of little worth"
+    )
+    assert second.startswith(
+        "jaxbiped: warning: the floor that was found is rolled by -20 degrees, above 20: it may be"
+    )
+
+
+def test_the_command_warns_of_a_picture_that_is_mostly_plain(pair, tmp_path, capsys):
+    """The motorcycle pair with all but a fifth of its rows painted over, turned by nothing."""
+    paths = []
+    for path in pair:
+        with Image.open(path) as image:
+            pixels = np.asarray(image).copy()
+        pixels[:410] = 90
+        paths.append(tmp_path / path.name)
+        Image.fromarray(pixels).save(paths[-1])
+    camera = with_changes(tmp_path, pose={"pitch": 15.0, "height": 1.08})
+    assert run(tmp_path, *paths, camera) == 0
+    captured = capsys.readouterr()
+    share = float(captured.out.partition("matched   ")[2].partition("%")[0])
+    assert 5 < share < 20
+    assert captured.err.count("\n") == 1 and f"warning: only {share}% of the pixels match" in captured.err
 
 
 def test_no_floor_in_view(pair, tmp_path):

@@ -46,7 +46,7 @@ def test_windows_line_ends_and_trailing_empty_lines_are_fine(write):
 
 BAD_MAPS = [
     ("", ": must be a Moving AI map, whose first line is 'type octile' (got '')"),
-    (MAP.replace("octile", "tile"), ": must be a Moving AI map, whose first line is 'type octile' (got 'type tile')"),
+    (MAP.replace("octile", "tile"), ": type: must be octile: maps of other types are not supported (got 'tile')"),
     (b"\x89PNG\r\n\x1a\n\0\0\0", ": must be a Moving AI map"),
     (MAP.replace("height 2\n", ""), ": height: must be a whole number of cells from 1 to 65536 (got '')"),
     (MAP.replace("height 2", "height 0"), ": height: must be a whole number of cells from 1 to 65536 (got '0')"),
@@ -99,8 +99,41 @@ def test_tolerance_follows_the_digits_of_the_file():
     np.testing.assert_allclose(of("4787", "11"), [5e-3, 5e-5], rtol=1e-2)  # whole numbers of 6 digits
 
 
+def test_a_byte_order_mark_is_no_content(write):
+    expected = moving_ai.load_map(write(MAP)).classes
+    grid = moving_ai.load_map(write(b"\xef\xbb\xbf" + MAP.encode()))
+    np.testing.assert_array_equal(grid.classes, expected)
+    found = moving_ai.load_scenario(write(b"\xef\xbb\xbf" + SCEN.encode(), "a.scen"), grid)
+    assert found.goal_ij.tolist() == [[1, 6]]
+
+
+@pytest.mark.parametrize("head", ["height 2\nwidth 7\n", "type octile\n\nwidth 7\nheight 2\nmade by hand\n"])
+def test_the_header_in_any_order_and_without_its_type(write, head):
+    expected = moving_ai.load_map(write(MAP)).classes
+    np.testing.assert_array_equal(moving_ai.load_map(write(MAP.replace(MAP[:28], head))).classes, expected)
+
+
+@pytest.mark.parametrize("name", ["Å.map", "a\u2028b\u0085c\x0bd.map", "two words.map"])
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1"])
+def test_lines_of_a_scenario_end_at_line_feeds_alone(write, name, encoding):
+    """A map's name may hold anything else, such as the second byte of a letter in UTF-8, or U+2028."""
+    grid = moving_ai.load_map(write(MAP))
+    text = (SCEN + SCEN.splitlines()[1].replace("5.41421356", "6.0") + "\n").replace("m.map", name)
+    scenario = moving_ai.load_scenario(write(text.encode(encoding, "replace"), "a.scen"), grid)
+    assert scenario.optimal.tolist() == [5.41421356, 6.0]
+
+
+def test_scenarios_without_a_version(write):
+    """Version 0: no line that says so, and perhaps no size of the map."""
+    grid = moving_ai.load_map(write(MAP))
+    for query in (SCEN[10:], SCEN[10:].replace("\t7\t2", "")):
+        scenario = moving_ai.load_scenario(write(query, "a.scen"), grid)
+        assert scenario.start_ij.tolist() == [[0, 1]] and scenario.goal_ij.tolist() == [[1, 6]]
+
+
 BAD_SCENARIOS = [
-    ("", ": line 1: must begin with 'version 1' (got '')"),
+    ("", ": must hold at least one query"),
+    ("words, no query\n", ": line 1: must hold bucket, map, width, height, start x"),
     (SCEN.replace("version 1", "version 2"), ": line 1: must begin with 'version 1' (got 'version 2')"),
     ("version 1\n", ": must hold at least one query"),
     (SCEN[:-13], ": line 2: must hold bucket, map, width, height, start x, start y, goal x, goal y, optimal length"),

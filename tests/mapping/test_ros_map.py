@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import yaml
@@ -92,6 +93,43 @@ def test_named_by_yaml_or_by_picture_of_any_grey_kind(write, tmp_path):
     np.testing.assert_array_equal(ros_map.load(write(plain, "m.pgm")).classes, expected)
 
 
+def test_keys_that_map_server_does_not_know_are_ignored(write):
+    grid = ros_map.load(write(map_type="occupancy", frame_id="map", occupied_tresh=0.65, **{"3": None}))
+    np.testing.assert_array_equal(grid.classes, ros_map.load(write()).classes)
+
+
+@pytest.mark.parametrize("yaw", ["1e-9", 1e-9, -1e-9, 2 * math.pi, 0])
+def test_a_yaw_that_is_rounding_is_none(write, yaw):
+    assert ros_map.load(write(origin=[-1.0, 2.0, yaw])).yaw == 0
+
+
+@pytest.mark.parametrize("yaw", [1.0, -2.0, math.pi / 2, 7.0])
+def test_a_yaw_turns_the_map_about_its_origin(write, yaw):
+    """Each cell's centre is where `map_server` says: origin + R(yaw) (column, row) resolution; and back."""
+    grid = ros_map.load(write(np.tile(RAMP, (5, 1)), origin=[-1.0, 2.0, yaw]))
+    cells = np.array([(i, j) for i in range(5) for j in range(9)])
+    along = (cells[:, ::-1] + 0.5) * 0.05
+    turned = complex(math.cos(yaw), math.sin(yaw)) * (along[:, 0] + 1j * along[:, 1])
+    expected = np.stack([turned.real - 1.0, turned.imag + 2.0], axis=1)
+    np.testing.assert_allclose(grid.centres_xy(cells), expected, atol=1e-12)
+    assert [grid.cell_at(tuple(xy)) for xy in expected] == [tuple(cell) for cell in cells.tolist()]
+    outside = turned[0] - 0.06 * complex(math.cos(yaw), math.sin(yaw))
+    with pytest.raises(InputError, match=r"turned by .* rad about \(-1, 2\) m"):
+        grid.cell_at((outside.real - 1.0, outside.imag + 2.0))
+
+
+def test_deep_and_turned_pictures_are_named(write, tmp_path):
+    deep = np.repeat((RAMP.astype(np.uint16) * 257)[..., None], 3, axis=-1)
+    (tmp_path / "deep.png").write_bytes(cv2.imencode(".png", deep)[1].tobytes())
+    (tmp_path / "deep.pgm").write_bytes(b"P5 2 1 65535\n1234")
+    for name in ("deep.png", "deep.pgm"):
+        assert "must have 8 bits a pixel" in refused(write(None, name)), name
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    Image.fromarray(RAMP).save(tmp_path / "turned.png", exif=exif)
+    assert "map_server does not turn pictures by their EXIF orientation (got 6)" in refused(write(None, "turned.png"))
+
+
 def test_an_absolute_picture_path(write, tmp_path):
     (tmp_path / "far").mkdir()
     Image.fromarray(RAMP).save(tmp_path / "far" / "p.png")
@@ -107,13 +145,12 @@ BAD_SHEETS = [
     ({"resolution": "wide"}, "resolution: Input should be a valid number"),
     ({"origin": [0.0, 0.0]}, "origin.2: Field required"),
     ({"origin": [0.0, math.inf, 0.0]}, "origin.1: Input should be a finite number"),
-    ({"origin": [0.0, 0.0, 0.3]}, "origin's yaw must be 0, since the grid's axes are the map's (it is 0.3 rad)"),
     ({"negate": 7}, "negate: Input should be a valid boolean"),
     ({"occupied_thresh": 1.5}, "occupied_thresh: Input should be less than or equal to 1 (got 1.5)"),
     ({"free_thresh": -0.1}, "free_thresh: Input should be greater than or equal to 0 (got -0.1)"),
     ({"free_thresh": 0.7}, "free_thresh 0.7 must not be above occupied_thresh 0.65"),
     ({"mode": "quaternary"}, "mode: Input should be 'trinary', 'scale' or 'raw' (got 'quaternary')"),
-    ({"occupied_tresh": 0.65}, "occupied_tresh: unknown key (got 0.65)"),
+    ({"origin": [0.0, 0.0, math.nan]}, "origin.2: Input should be a finite number"),
 ]
 
 
@@ -133,7 +170,7 @@ def test_sheets_that_are_no_yaml(tmp_path):
     (tmp_path / "m.yaml").write_text("image: [unclosed")
     assert refused(tmp_path / "m.yaml").startswith(f"{tmp_path / 'm.yaml'}: is not valid YAML")
     (tmp_path / "m.yaml").write_bytes(b"\xff\xfe\x00")
-    assert "is not valid YAML" in refused(tmp_path / "m.yaml")
+    assert "cannot be read as text: it is not in UTF-8" in refused(tmp_path / "m.yaml")
     (tmp_path / "m.yaml").write_text("!!python/object/apply:os.getcwd []")
     assert "is not valid YAML" in refused(tmp_path / "m.yaml")
     assert refused(tmp_path / "n.yaml") == f"{tmp_path / 'n.yaml'}: no such file"

@@ -167,3 +167,21 @@ def test_a_log_whose_parts_differ_in_length_is_refused():
     whole = vars(mission(3))
     with pytest.raises(ValueError, match="action has 2 moments, time has 3"):
         MissionLog(**whole | {"action": ("Start", "Turn-direction")})
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.6, -2.5])
+def test_a_map_that_lies_turned_is_drawn_turned(yaw):
+    """Each cell's colour is where the cell is, and all of the map is in the picture."""
+    classes = np.array([[1, 1, 4, 2], [3, 1, 4, 1], [1, 2, 1, 3]], np.int8)
+    grid = ClassGrid(classes, np.zeros_like(classes), np.array([-1.0, 2.0]), 0.1, yaw)
+    figure = Figure(figsize=(6, 6), dpi=100)
+    canvas, ax = FigureCanvasAgg(figure), figure.subplots()
+    pictures.draw_map(ax, grid)
+    canvas.draw()
+    shown = np.asarray(canvas.buffer_rgba())[..., :3]
+    cells = np.argwhere(classes)
+    for (i, j), xy in zip(cells, grid.centres_xy(cells) * 100, strict=True):
+        x, y = ax.transData.transform(xy + 2.0)  # [cm] beside the number in the cell
+        assert ax.bbox.contains(x, y)
+        expected = np.array(rgb(pictures.COLOURS[Cell(classes[i, j])]))
+        assert np.abs(shown[int(shown.shape[0] - y), int(x)].astype(int) - expected).max() < 30

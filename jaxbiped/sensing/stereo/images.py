@@ -1,16 +1,27 @@
-"""Pictures from files: any depth of grey or colour, as 8 bits."""
+"""Pictures from files: any depth of grey or colour, turned upright as their EXIF tags say, as 8 bits."""
 
 from __future__ import annotations
 
-import warnings
+import io
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
-from PIL import Image
+from jaxtyping import Float32, UInt8
+from PIL import Image, ImageOps, UnidentifiedImageError
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
+from jaxbiped.sensing.image_depth import (
+    DEEP_COLOUR,
+    HEIGHT,
+    TIFF,
+    WIDTH,
+    UnsupportedError,
+    deep_samples,
+    no_chatter,
+    sample_bits,
+    tiff_tags,
+)
 from jaxbiped.sensing.stereo.matching import size
 
 MOST_PIXELS = 64_000_000
@@ -42,26 +53,63 @@ def load_pair(left: str | Path, right: str | Path) -> tuple[np.ndarray, np.ndarr
 
 
 def read(path: str | Path, field: str) -> np.ndarray:
-    """One picture: 8 bits grey or RGB, or more bits grey."""
+    """One picture, upright: 8 bits grey or RGB, or float32 grey or RGB of more bits; alpha is left out."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit below is ours
-            with Image.open(path) as picture:
-                if picture.width * picture.height > MOST_PIXELS:
-                    message = f"must have at most {MOST_PIXELS:,} pixels"
-                    raise InputError(message, file=path, field=field, value=f"{picture.width} x {picture.height}")
-                picture.load()
-                if picture.mode in DEEP:
-                    values = np.nan_to_num(np.asarray(picture, np.float32), posinf=0, neginf=0)
-                    return np.maximum(values, 0)
-                return np.asarray(picture.convert("L" if picture.mode in ("L", "LA", "1") else "RGB"))
+        data = Path(path).read_bytes()
     except FileNotFoundError:
         raise InputError("no such file", file=path, field=field) from None
+    except OSError as error:
+        raise InputError(f"cannot be read: {reason(error)}", file=path, field=field) from None
+    try:
+        image = read_tiff(data, path, field) if data.startswith(TIFF) else None
+        return read_any(data, path, field) if image is None else image
     except InputError:
         raise
-    except (OSError, SyntaxError, ValueError, EOFError, Image.DecompressionBombError) as error:
-        what = reason(error) if isinstance(error, OSError) and error.errno else str(error) or type(error).__name__
-        raise InputError(f"is no picture, or is damaged: {what}", file=path, field=field) from None
+    except UnsupportedError as error:
+        raise InputError(f"is a kind of picture that is not supported: {error}", file=path, field=field) from None
+    except UnidentifiedImageError:
+        message = "is no picture, or is damaged, or of a kind that is not supported"
+        raise InputError(message, file=path, field=field) from None
+    except Exception:  # Pillow raises whatever a damaged picture makes it trip over
+        raise InputError("is no picture, or is damaged", file=path, field=field) from None
+
+
+def read_tiff(data: bytes, path: str | Path, field: str) -> Float32[np.ndarray, "H W *C"] | None:
+    """A TIFF picture of more than 8 bits; None where it has fewer, or where Pillow alone can read it."""
+    tags = tiff_tags(data)
+    check_size(tags.get(WIDTH, 0), tags.get(HEIGHT, 0), path, field)
+    samples = deep_samples(data) if sample_bits(data) > 8 else None
+    return None if samples is None else as_light(samples)
+
+
+def read_any(data: bytes, path: str | Path, field: str) -> np.ndarray:
+    """Any picture that Pillow knows."""
+    with no_chatter(), Image.open(io.BytesIO(data)) as picture:
+        check_size(*picture.size, path, field)
+        picture.load()
+        picture = ImageOps.exif_transpose(picture)
+        if picture.mode in DEEP:
+            return as_light(np.asarray(picture))
+        deep = sample_bits(data) > 8
+        if deep or picture.format in DEEP_COLOUR:
+            samples = deep_samples(data)
+            if samples is not None and samples.dtype != np.uint8:
+                return as_light(samples)
+            if deep:
+                raise UnsupportedError(f"{picture.mode} of {sample_bits(data)} bits a sample")
+        return np.asarray(picture.convert("L" if picture.mode in ("L", "LA", "La", "1") else "RGB"))
+
+
+def as_light(samples: np.ndarray) -> Float32[np.ndarray, "H W *C"]:
+    """What was measured, 0 or more; what is not finite is 0."""
+    return np.maximum(np.nan_to_num(samples.astype(np.float32), posinf=0, neginf=0), 0)
+
+
+def check_size(width: int, height: int, path: str | Path, field: str) -> None:
+    """Raise `InputError` about a picture that is too large, before it is unpacked."""
+    if width * height > MOST_PIXELS:
+        message = f"must have at most {MOST_PIXELS:,} pixels"
+        raise InputError(message, file=path, field=field, value=f"{width} x {height}")
 
 
 def as_rgb(image: UInt8[np.ndarray, "H W *C"]) -> UInt8[np.ndarray, "N 3"]:

@@ -60,7 +60,8 @@ def make_rig(config: RectifiedConfig | RawConfig) -> Rig:
     R_left, R_right, P_left, P_right, *_ = cv2.stereoRectify(
         *lenses[0], *lenses[1], shape, R, T, flags=cv2.CALIB_ZERO_DISPARITY, alpha=0
     )
-    focal, baseline = float(P_left[0, 0]), float(-P_right[0, 3] / P_right[0, 0])
+    with np.errstate(all="ignore"):
+        focal, baseline = float(P_left[0, 0]), float(-P_right[0, 3] / P_right[0, 0])
     if not (np.isfinite([focal, baseline]).all() and 0.05 * config.width <= focal <= 100 * config.width):
         message = "cannot be rectified: its lenses or its rotation leave no common picture"
         raise InputError(message, field="camera", value=f"focal length of {focal:.3g} px after rectification")

@@ -12,21 +12,20 @@ import re
 from pathlib import Path
 
 import numpy as np
-import yaml
 from jaxtyping import Float64
 
 from jaxbiped.errors import InputError
-from jaxbiped.files import reason
+from jaxbiped.files import read_text, read_yaml
+from jaxbiped.sensing.stereo.lens_model import check_camera_matrix, check_lens_model
 
 SIDES = {"left": "right", "right": "left"}
-MODELS = ("plumb_bob", "rational_polynomial", "none", "")  # of distortion; OpenCV's order of coefficients
 SHAPES = {"camera_matrix": (3, 3), "rectification_matrix": (3, 3), "projection_matrix": (3, 4)}
 LEAST_SHIFT = 1e-9  # [px] of focal length times baseline: a single camera has 0
 
 
 def is_ros(path: Path) -> bool:
     """Whether a YAML file is one of these, and not one of OpenCV's."""
-    text = path.read_bytes()[:100_000].decode("utf-8", "replace")
+    text = read_text(path, otherwise="latin-1")[:100_000]
     return "opencv-matrix" not in text and bool(re.search(r"^(camera|projection)_matrix\s*:", text, re.MULTILINE))
 
 
@@ -73,23 +72,22 @@ def read_ros(path: Path) -> dict:
 
 def read_camera(path: Path) -> dict:
     """Size, matrices and distortion of one file."""
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        what = reason(error) if isinstance(error, OSError) else str(error).splitlines()[0]
-        raise InputError(f"cannot be read: {what}", file=path) from None
+    content = read_yaml(path)
     if not isinstance(content, dict):
         raise InputError("is no calibration of a camera", file=path)
+    check_lens_model(content, path)  # the calibrator writes distortion_model, camera_model or both
     found = {name: matrix(content, name, shape, path) for name, shape in SHAPES.items()}
-    model = str(content.get("distortion_model", "plumb_bob"))
-    if model not in MODELS:
-        message = f"must be one of {', '.join(filter(None, MODELS))}"
-        raise InputError(message, file=path, field="distortion_model", value=model)
+    check_camera_matrix(found["camera_matrix"], path, "camera_matrix")
     size = tuple(content.get(name) for name in ("image_width", "image_height"))
     if not all(isinstance(pixels, int) for pixels in size):
         raise InputError("must be whole numbers", file=path, field="image_width, image_height", value=list(size))
-    found["distortion"] = tuple(numbers(content, "distortion_coefficients", path)) if model in MODELS[:2] else ()
-    return found | {"size": size}
+    distortion = tuple(numbers(content, "distortion_coefficients", path))
+    if str(content.get("distortion_model", "plumb_bob") or "none").lower() == "none":
+        if any(distortion):
+            message = "must be named, for the coefficients of distortion are not 0"
+            raise InputError(message, file=path, field="distortion_model", value=content["distortion_model"])
+        distortion = ()
+    return found | {"size": size, "distortion": distortion}
 
 
 def matrix(content: dict, name: str, shape: tuple[int, int], path: Path) -> Float64[np.ndarray, "m n"]:
@@ -106,7 +104,7 @@ def numbers(content: dict, name: str, path: Path) -> list[float]:
     """The `data` of a field."""
     field = content.get(name)
     values = field.get("data") if isinstance(field, dict) else None
-    if not isinstance(values, list) or not all(isinstance(v, int | float) and np.isfinite(v) for v in values):
+    if not isinstance(values, list) or not all(isinstance(v, int | float) and abs(v) < 1e300 for v in values):
         message = "must hold `data`, a list of finite numbers" if name in content else "is missing"
         raise InputError(message, file=path, field=name)
     return [float(value) for value in values]

@@ -91,6 +91,72 @@ def test_an_opencv_file(tmp_path):
         load_rig(millimetres, SHAPE)
 
 
+FOREIGN_LENSES = [
+    ("camera_model: fisheye", "camera_model"),
+    ('model: "omnidirectional"', "model"),
+    ("cameraType: catadioptric", "cameraType"),
+    ("distortion_model: equidistant", "distortion_model"),
+    ("fisheye_model: 1", "fisheye_model"),
+    ("isFisheye: 1", "isFisheye"),
+    ("xi1: 1.2", "xi1"),
+    ("cam:\n   lensModel: ocam", "lensModel"),
+]
+
+
+@pytest.mark.parametrize(("line", "key"), FOREIGN_LENSES)
+def test_other_lenses_in_an_opencv_file(tmp_path, line, key):
+    """D of a fisheye has four numbers, too: what tells it is its name or its flag."""
+    text = opencv_file(tmp_path / "rig.yml", [-0.2, 0.001, 0.0]).read_text()
+    with pytest.raises(InputError, match=rf"fish.yml: {key}: (must be one of pinhole|is of an omnidirectional lens)"):
+        load_rig(written(tmp_path, text + line + "\n", "fish.yml"), SHAPE)
+    pinhole = "fisheye_model: 0\ncamera_model: pinhole\nmodel: D435\ncalibration_time: today\n"
+    assert load_rig(written(tmp_path, text + pinhole, "pinhole.yml"), SHAPE).camera.size == SHAPE
+
+
+def test_other_lenses_in_xml_and_in_a_middlebury_file(tmp_path):
+    text = opencv_file(tmp_path / "rig.xml", [-0.2, 0.001, 0.0]).read_text()
+    path = written(
+        tmp_path, text.replace("</opencv_storage>", "<fisheye_model>1</fisheye_model></opencv_storage>"), "f.xml"
+    )
+    with pytest.raises(InputError, match=r"f.xml: fisheye_model: must be one of pinhole"):
+        load_rig(path, SHAPE)
+    with pytest.raises(InputError, match=r"calib.txt: camera_model: must be one of pinhole"):
+        load_rig(written(tmp_path, MIDDLEBURY + "camera_model=equidistant\n", "calib.txt"), SHAPE)
+
+
+@pytest.mark.parametrize("model", ["radtan", "equidistant"])
+def test_kalibr_is_named(tmp_path, model):
+    text = f"cam0:\n  camera_model: pinhole\n  distortion_model: {model}\n  intrinsics: [1.0, 2.0, 3.0, 4.0]\n"
+    with pytest.raises(InputError, match=r"k.yaml: is a calibration of Kalibr, which is not supported"):
+        load_rig(written(tmp_path, text, "k.yaml"), SHAPE)
+
+
+def test_matrices_that_would_be_read_wrongly(tmp_path):
+    """MATLAB's are transposed, and have other names for distortion: no distortion must not be read for these."""
+    text = opencv_file(tmp_path / "rig.yml", [-0.2, 0.001, 0.0]).read_text()
+    turned = text.replace(
+        "data: [ 700., 0., 370., 0., 702., 250., 0., 0., 1. ]", "data: [ 700., 0., 0., 0., 702., 0., 370., 250., 1. ]"
+    )
+    assert turned != text
+    with pytest.raises(
+        InputError, match=r"t.yml: M1: must be \[\[fx, 0, cx\], \[0, fy, cy\], \[0, 0, 1\]\], without skew"
+    ):
+        load_rig(written(tmp_path, turned, "t.yml"), SHAPE)
+    for name in ("RadialDistortion1", "kc_left", "dist1"):
+        renamed = text.replace("D1:", f"{name}:")
+        with pytest.raises(InputError, match=rf"d.yml: {name}: is not known; distortion must be under the names D1"):
+            load_rig(written(tmp_path, renamed, "d.yml"), SHAPE)
+    with pytest.raises(InputError, match=r"l.yml: M1: must be a matrix \(!!opencv-matrix\) of finite numbers"):
+        load_rig(written(tmp_path, text.replace("M1:", "M1: [1, 2]\nN1:"), "l.yml"), SHAPE)
+
+
+def test_a_middlebury_file_without_its_optional_lines(tmp_path):
+    """Without doffs, the principal points tell it; without a size, the pictures do."""
+    for dropped in ("doffs=31.086\n", "width=741\nheight=500\n", "ndisp=70\n"):
+        rig = load_rig(written(tmp_path, MIDDLEBURY.replace(dropped, ""), "calib.txt"), SHAPE)
+        assert rig.camera.doffs == pytest.approx(31.086) and rig.camera.size == SHAPE
+
+
 def test_an_unrectified_pair_in_toml(tmp_path):
     text = """
 width = 741
@@ -147,7 +213,7 @@ def test_missing_values_are_named(tmp_path):
         ("camera.toml", "focal = ", "is not valid TOML"),
         ("camera.json", "{}", r"camera: must be one of .toml, .yaml, .yml, .xml, .txt \(got '.json'\)"),
         ("calib.txt", "hello", "cam0: is missing: a Middlebury calib.txt holds"),
-        ("calib.txt", MIDDLEBURY.replace("193.001", "wide"), "must hold numbers"),
+        ("calib.txt", MIDDLEBURY.replace("193.001", "wide"), "must hold finite numbers"),
         ("calib.txt", MIDDLEBURY.replace("; 0 0 1]", "]"), r"cam0: must be a matrix \[3, 3\]"),
         ("calib.txt", MIDDLEBURY.replace("193.001", "193001"), "baseline"),
         ("rig.yaml", "%YAML:1.0\n---\nfoo: [", "is no OpenCV calibration"),

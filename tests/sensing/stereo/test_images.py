@@ -1,8 +1,13 @@
 """Pictures of every depth and kind, damaged ones, and pairs that are none."""
 
+import io
+import struct
+import zlib
+
 import numpy as np
 import pytest
-from PIL import Image
+import tifffile
+from PIL import Image, ImageOps
 from skimage import data
 
 from jaxbiped.errors import InputError
@@ -42,6 +47,135 @@ def test_16_bit_pictures_match_like_8_bit_ones(tmp_path, scene, bits):
     assert match(left, right, PARAMS).valid.mean() > match(*scene[:2], PARAMS).valid.mean() - 0.01
     ratio = left.astype(float).mean() / right.astype(float).mean()
     assert ratio == pytest.approx(scene[0].mean() / scene[1].mean(), rel=0.01)  # one factor for both
+
+
+def png(image):
+    """A PNG file of 16 bits, grey with alpha too, which no library at hand writes."""
+    height, width, channels = image.shape
+
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+    head = struct.pack(">IIBBBBB", width, height, 16, {1: 0, 2: 4, 3: 2, 4: 6}[channels], 0, 0, 0)
+    rows = b"".join(b"\0" + row.astype(">u2").tobytes() for row in image)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+
+
+def ppm(image):
+    """A PGM or PPM file of 16 bits."""
+    height, width, channels = image.shape
+    return b"P%d\n# deep\n%d %d\n65535\n" % (5 if channels == 1 else 6, width, height) + image.astype(">u2").tobytes()
+
+
+def tiff(image, **how):
+    stream = io.BytesIO()
+    colours = "rgb" if image.shape[-1] > 2 else how.pop("photometric", "minisblack")
+    alpha = {"extrasamples": ["unassalpha"]} if image.shape[-1] in (2, 4) else {}
+    image = image[..., 0] if image.shape[-1] == 1 else image
+    tifffile.imwrite(stream, image, photometric=colours, planarconfig="contig", **alpha, **how)
+    return stream.getvalue()
+
+
+CHANNELS = {"grey": 1, "grey and alpha": 2, "colour": 3, "colour and alpha": 4}
+DEEP_FILES = {
+    "png": png,
+    "ppm": ppm,
+    "tiff": tiff,
+    "big tiff": lambda image: tiff(image, bigtiff=True),
+    "compressed tiff": lambda image: tiff(image, compression="zlib", predictor=True),
+    "other end first": lambda image: tiff(image, byteorder=">"),
+    "white is 0": lambda image: tiff(65535 - image, photometric="miniswhite"),
+    "float": lambda image: tiff((image / 65535).astype(np.float32)),
+    "double": lambda image: tiff(image / 65535),
+    "32 bits": lambda image: tiff(image.astype(np.uint32) * 65537),
+}
+
+
+@pytest.mark.parametrize("channels", CHANNELS)
+@pytest.mark.parametrize("kind", DEEP_FILES)
+def test_ten_bits_in_sixteen_are_kept_in_every_kind_of_file(tmp_path, scene, kind, channels):
+    """What 10 bits hold of a dark pair comes through, or the kind is refused by name; the low byte is never lost."""
+    number = CHANNELS[channels]
+    if (kind == "ppm" and number in (2, 4)) or (kind == "white is 0" and number > 2):
+        pytest.skip("there is no such file")
+    paths = []
+    for name, image in zip(("left", "right"), scene, strict=False):
+        deep = np.repeat((image.astype(np.uint16) * 4 + 3)[..., None], number, axis=-1)
+        if number in (2, 4):
+            deep[..., -1] = 65535
+        paths.append(tmp_path / f"{name}.any")
+        paths[-1].write_bytes(DEEP_FILES[kind](deep))
+    if kind not in ("png", "ppm") and number == 2:
+        with pytest.raises(InputError, match=r"not supported(: TIFF of \d+ bits a sample with such channels)?$"):
+            load_pair(*paths)
+        return
+    for got, image in zip(load_pair(*paths), scene, strict=False):
+        expected = image * 255.0 / max(np.percentile(view, 99.9) for view in scene[:2])
+        error = np.abs(got.reshape(*image.shape, -1).mean(-1) - np.minimum(expected, 255))
+        assert error.max() < 2, error.max()  # grey levels; with the high bytes alone it is 40
+
+
+def test_colours_are_kept_in_16_bits(tmp_path):
+    """Red stays red, and light is that of the eye."""
+    colours = np.random.default_rng(3).integers(0, 1024, (2, 20, 30, 3)).astype(np.uint16)
+    for kind in ("png", "ppm", "tiff"):
+        paths = [tmp_path / f"{name}.{kind}" for name in ("left", "right")]
+        for path, image in zip(paths, colours, strict=True):
+            path.write_bytes(DEEP_FILES[kind](image))
+        for got, image in zip(load_pair(*paths), colours, strict=True):
+            np.testing.assert_allclose(got, image / 1023 * 255, atol=1.5)
+
+
+@pytest.mark.parametrize("suffix", ["png", "jpg", "tiff"])
+@pytest.mark.parametrize("deep", [False, True])
+@pytest.mark.parametrize("orientation", range(1, 9))
+def test_exif_orientations_are_honoured(tmp_path, suffix, deep, orientation):
+    """Stored turned, with the tag that says so: read upright, in any depth."""
+    upright = np.zeros((24, 40), np.uint8)
+    upright[:8, :16], upright[8:, :8] = 255, 128
+    inverse = {6: 8, 8: 6}.get(orientation, orientation)
+    exif = Image.Exif()
+    exif[0x0112] = inverse
+    turned = Image.fromarray(upright)
+    turned.getexif()[0x0112] = inverse
+    stored = np.asarray(ImageOps.exif_transpose(turned))
+    exif[0x0112] = orientation
+    path = tmp_path / f"a.{suffix}"
+    if not deep:
+        Image.fromarray(stored).save(path, exif=exif, **({"quality": 100} if suffix == "jpg" else {}))
+    elif suffix == "tiff":
+        colour = np.repeat(stored[..., None], 3, axis=-1).astype(np.uint16) * 257
+        path.write_bytes(tiff(colour, extratags=[(0x0112, "H", 1, orientation, True)]))
+    elif suffix == "png":
+        colour = png(np.repeat(stored[..., None], 3, axis=-1).astype(np.uint16) * 257)
+        data = exif.tobytes().removeprefix(b"Exif\0\0")
+        chunk = struct.pack(">I", len(data)) + b"eXIf" + data + struct.pack(">I", zlib.crc32(b"eXIf" + data))
+        path.write_bytes(colour[:33] + chunk + colour[33:])
+    else:
+        pytest.skip("JPEG has 8 bits")
+    got = images.read(path, "left").astype(float)
+    grey = got.mean(-1) if got.ndim == 3 else got
+    np.testing.assert_allclose(grey / grey.max(), upright / 255, atol=0.05)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4, 8])
+def test_few_bits_are_spread_over_the_whole_range(tmp_path, bits):
+    values = np.tile(np.arange(2**bits, dtype=np.uint8), (16, 256 >> bits))
+    palette = Image.fromarray(values, "P")
+    palette.putpalette(np.repeat(np.linspace(0, 255, 2**bits).round().astype(np.uint8), 3).tobytes())
+    palette.save(tmp_path / "palette.png", bits=bits)
+    got = images.read(tmp_path / "palette.png", "left")
+    np.testing.assert_array_equal(got.reshape(16, 256, -1)[..., 0], np.round(values * 255.0 / (2**bits - 1)))
+
+
+def test_a_kind_of_tiff_that_is_not_supported_is_not_called_damaged(tmp_path):
+    for name, image, how in (
+        ("half", np.ones((9, 9, 3), np.float16), {}),
+        ("cmyk", np.ones((9, 9, 4), np.uint16), {"photometric": "separated"}),
+    ):
+        tifffile.imwrite(tmp_path / f"{name}.tiff", image, **{"photometric": "rgb"} | how)
+        with pytest.raises(InputError, match="not supported"):
+            images.read(tmp_path / f"{name}.tiff", "left")
 
 
 @pytest.mark.parametrize("mode", ["RGB", "RGBA", "P", "LA", "CMYK", "I", "F"])
@@ -89,7 +223,7 @@ def test_damaged_pictures(tmp_path, scene, damage, capfd):
         left.unlink()
         if damage == "folder":
             left.mkdir()
-    words = "no such file" if damage == "none" else "is no picture, or is damaged"
+    words = {"none": "no such file", "folder": "is a directory"}.get(damage, "is no picture, or is damaged")
     with pytest.raises(InputError, match=words) as caught:
         load_pair(left, right)
     assert str(caught.value).startswith(f"{left}: left: ") and "\n" not in str(caught.value)

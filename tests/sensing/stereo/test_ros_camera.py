@@ -103,7 +103,7 @@ def spoilt(side, name, value):
         ("right", "rectification_matrix", field([1.0, 0]), "rectification_matrix: must hold 3 x 3 numbers"),
         ("left", "camera_matrix", {"data": [1, "wide"]}, "camera_matrix: must hold `data`, a list of finite numbers"),
         ("left", "camera_matrix", field([np.nan] * 9), "finite numbers"),
-        ("left", "distortion_model", "equidistant", "distortion_model: must be one of plumb_bob, rational_polynomial"),
+        ("left", "distortion_model", "equidistant", "distortion_model: must be one of pinhole, plumb_bob, radtan"),
         ("left", "distortion_coefficients", field([0.1] * 6), "distortion must hold 0, 4, 5, 8, 12 or 14 numbers"),
         ("right", "image_width", 320, r"right.yaml: image_width, image_height: must be as in left.yaml, 640 x 480"),
         ("right", "image_width", "wide", "must be whole numbers"),
@@ -115,6 +115,58 @@ def test_bad_files_are_named(tmp_path, side, name, value, words):
     with pytest.raises(InputError, match=words) as caught:
         load_rig(written(tmp_path, spoilt(side, name, value)), (1, 1))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["camera_model", "distortion_model", "lens_model", "CameraModel", "projection"])
+@pytest.mark.parametrize("model", ["fisheye", "equidistant", "Kannala-Brandt", "omni", "thin_prism_fisheye", "mei"])
+def test_other_lenses_are_refused_whatever_they_are_named_by(tmp_path, key, model):
+    """ROS's own calibrator writes `camera_model: fisheye`, and four coefficients as of a pinhole."""
+    files = cameras()
+    for camera in files.values():
+        camera.pop("distortion_model")
+        camera["distortion_coefficients"] = field([0.175653, -0.031772, 0.000362, -0.000719])
+        camera[key] = model
+    with pytest.raises(
+        InputError, match=rf"left.yaml: {key}: must be one of pinhole, .* not supported \(got '{model}'"
+    ):
+        load_rig(written(tmp_path, files), (1, 1))
+    files["left"][key] = "pinhole"
+    with pytest.raises(InputError, match=rf"right.yaml: {key}: must be one of pinhole"):
+        load_rig(written(tmp_path, files), (1, 1))
+
+
+@pytest.mark.parametrize("model", ["pinhole", "Plumb Bob", "radtan", "brown_conrady", "PLUMB_BOB"])
+def test_names_of_the_pinhole_are_taken(tmp_path, model):
+    files = cameras()
+    for camera in files.values():
+        camera |= {
+            "camera_model": model,
+            "model": "Bumblebee 2",
+            "camera_type": "Basler",
+            "lens": "6 mm",
+            "distortion_model": "plumb_bob",
+        }
+    assert load_rig(written(tmp_path, files), (1, 1)).camera.baseline == pytest.approx(np.linalg.norm(TRANSLATION))
+
+
+@pytest.mark.parametrize("model", ["none", "", None])
+def test_no_model_has_no_coefficients(tmp_path, model):
+    files = cameras()
+    for camera in files.values():
+        camera["distortion_model"] = model
+    with pytest.raises(
+        InputError, match="distortion_model: must be named, for the coefficients of distortion are not 0"
+    ):
+        load_rig(written(tmp_path, files), (1, 1))
+    for camera in files.values():
+        camera["distortion_coefficients"] = field([0.0] * 5)
+    assert load_rig(written(tmp_path, files), (1, 1)).camera.size == SIZE
+
+
+@pytest.mark.parametrize("K", [K_LEFT.T, K_LEFT + np.diag([3.0, 0.0], 1), K_LEFT * 2])
+def test_camera_matrices_of_another_form(tmp_path, K):
+    with pytest.raises(InputError, match=r"camera_matrix: must be \[\[fx, 0, cx\], .* without skew and not transposed"):
+        load_rig(written(tmp_path, spoilt("left", "camera_matrix", field(K))), (1, 1))
 
 
 def test_one_file_alone(tmp_path):
