@@ -20,6 +20,23 @@ LOCK = Lock()
 
 
 @njit(nogil=True)
+def is_settled(time, face, turn, height, width, cost):
+    """Whether no state can be lowered by any of the moves and turns out of it; arguments as of `settle`."""
+    cells = height * width
+    for state in range(8 * cells):
+        h, n = state // cells, state % cells
+        least = turn + min(cost[(h + 1) % 8 * cells + n], cost[(h + 7) % 8 * cells + n])
+        i, j = n // width, n % width
+        for k in ((h + 7) % 8, h, (h + 1) % 8):
+            a, b = i + DI[k], j + DJ[k]
+            if 0 <= a < height and 0 <= b < width and face[k * cells + n] == h:
+                least = min(least, cost[h * cells + a * width + b] + time[k * cells + n])
+        if least < cost[state]:
+            return False
+    return True
+
+
+@njit(nogil=True)
 def settle(time, face, turn, goal_i, goal_j, height, width, cost):
     """One arena: `time` and `face` [8 * H * W] flat; `cost` [8 * H * W] is written. Returns whether it is settled."""
     cells = height * width
@@ -48,18 +65,7 @@ def settle(time, face, turn, goal_i, goal_j, height, width, cost):
                 if total < cost[before]:
                     cost[before] = total
                     heapq.heappush(heap, (total, before))
-    # the proof: no state can be lowered by any of the moves and turns out of it
-    for state in range(8 * cells):
-        h, n = state // cells, state % cells
-        least = turn + min(cost[(h + 1) % 8 * cells + n], cost[(h + 7) % 8 * cells + n])
-        i, j = n // width, n % width
-        for k in ((h + 7) % 8, h, (h + 1) % 8):
-            a, b = i + DI[k], j + DJ[k]
-            if 0 <= a < height and 0 <= b < width and face[k * cells + n] == h:
-                least = min(least, cost[h * cells + a * width + b] + time[k * cells + n])
-        if least < cost[state]:
-            return False
-    return True
+    return is_settled(time, face, turn, height, width, cost)
 
 
 @njit(nogil=True)
