@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import heapq
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Int
 
+from jaxbiped.core.checks import as_array, cells, leading_shape, whole_number
+from jaxbiped.errors import InputError
 from jaxbiped.planning.costs import DIRECTIONS
 from jaxbiped.planning.path import TIE
 
@@ -19,12 +21,7 @@ class AStarPath(NamedTuple):
     cost: float
 
 
-def astar(
-    edge_costs: Float[Array | np.ndarray, "8 H W"],
-    start_ij: Int[Array | np.ndarray, "2"] | tuple[int, int],
-    goal_ij: Int[Array | np.ndarray, "2"] | tuple[int, int],
-    heading: int = -1,
-) -> AStarPath:
+def astar(edge_costs: Any, start_ij: Any, goal_ij: Any, heading: int = -1) -> AStarPath:
     """Least path on the edge costs of one arena, in plain Python.
 
     It searches from the goal towards the start, so that what it settles is the cost to go, and goes on until
@@ -32,10 +29,22 @@ def astar(
     the present heading (`heading` before the first move) if it is among the best, else the first in the
     order of `DIRECTIONS`. The heuristic is the octile distance at the least cost of a straight and of an
     oblique move; it never overrates, since two moves of one kind may do the work of the other.
+
+    Raises:
+      InputError: an argument of another rank, shape or dtype, a cost that is negative or NaN, or no direction.
     """
-    edges = np.asarray(edge_costs, np.float64)
-    _, height, width = edges.shape
-    start, goal = tuple(int(x) for x in start_ij), tuple(int(x) for x in goal_ij)
+    edges = as_array("edge_costs", edge_costs)
+    start, goal = cells("start_ij", start_ij), cells("goal_ij", goal_ij)
+    if leading_shape(edge_costs=(edges, "8 H W"), start_ij=(start, "2"), goal_ij=(goal, "2")):
+        raise InputError("must be of one arena: edge_costs [8, H, W], start_ij [2], goal_ij [2]")
+    heading = whole_number("heading", heading, -1)
+    if heading > 7:
+        raise InputError("must be a direction from 0 to 7, or -1 for none", field="heading", value=heading)
+    edges = np.asarray(edges, np.float64)
+    if not (edges >= 0).all():  # nor NaN
+        raise InputError("must be 0 or more", field="edge_costs", value=float(edges[~(edges >= 0)][0]))
+    height, width = edges.shape[1:]
+    start, goal = tuple(start.tolist()), tuple(goal.tolist())
     nowhere = AStarPath(np.zeros((0, 2), int), np.inf)
     if not all(0 <= i < height and 0 <= j < width for i, j in (start, goal)):
         return nowhere
@@ -63,9 +72,9 @@ def astar(
     if start not in settled:
         return nowhere
 
-    cells = [start]
-    while cells[-1] != goal:
-        i, j = cells[-1]
+    passed = [start]
+    while passed[-1] != goal:
+        i, j = passed[-1]
         ahead = {}
         for k, (di, dj) in enumerate(DIRECTIONS):
             there = (i + int(di), j + int(dj))
@@ -75,5 +84,5 @@ def astar(
         best = min(ahead.values())
         good = [k for k, total in ahead.items() if total <= best * (1 + TIE)]
         heading = heading if heading in good else good[0]
-        cells.append((i + int(DIRECTIONS[heading][0]), j + int(DIRECTIONS[heading][1])))
-    return AStarPath(np.array(cells), cost[start])
+        passed.append((i + int(DIRECTIONS[heading][0]), j + int(DIRECTIONS[heading][1])))
+    return AStarPath(np.array(passed), cost[start])

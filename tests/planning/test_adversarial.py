@@ -20,6 +20,7 @@ SHAPES = ((1, 9), (9, 1), (5, 7), (12, 9))
 COUNT = 5500  # maps of each shape
 METHODS = ("line_sweep", "dijkstra", "wavefront")
 RELATIVE = 1e-5
+YAW = 1e-6  # of 45 degrees: what a float32 of radians, up to pi, may be off, with its sum and its remainder
 SOME = 40  # maps compared with plain Python
 
 
@@ -110,8 +111,10 @@ def test_every_field_over_headings_is_dijkstra(shape):
     yaw = (rng.integers(0, 8, count) * np.pi / 4).astype(np.float32)
     path = planning.heading_path(out, start_ij, yaw, shape[0] * shape[1])
     taken = planning.path_time(out.moves, out.turn, path, yaw)
-    reached = np.asarray(path.valid)
-    np.testing.assert_allclose(taken[reached], path.cost[reached], rtol=RELATIVE + TIE * shape[0] * shape[1])
+    reached, length = np.asarray(path.valid), shape[0] * shape[1]
+    off = np.abs(np.asarray(taken, float) - np.asarray(path.cost, float))[reached]
+    share = (RELATIVE + TIE * length) * np.asarray(path.cost)[reached]
+    assert (off <= share + YAW * length * times.turn[reached]).all()
 
 
 @pytest.mark.parametrize("batch", [1, LANES - 1, LANES, 31, 32, 33, 64])
