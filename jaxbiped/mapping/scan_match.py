@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.geometry.small import matrix, product
 from jaxbiped.mapping.grid import GridSpec
@@ -79,6 +80,7 @@ def no_outlines(spec: GridSpec) -> Outlines:
     return Outlines(jnp.zeros(spec.shape), jnp.zeros((*spec.shape, 2)), jnp.zeros((*spec.shape, 3)))
 
 
+@checked()
 def find_walls(view: View, shape: tuple[int, int], step: int, ground: Float[Array, ""]) -> Walls:
     """The points of a level view on upright surfaces: those that lie above or below a neighbour, not behind it.
 
@@ -110,6 +112,7 @@ def thinned(walls: Walls, shape: tuple[int, int]) -> Walls:
     return jax.tree.map(lambda v: jnp.zeros(MOST, v.dtype).at[place].set(v, mode="drop"), walls)
 
 
+@checked()
 def add_walls(outlines: Outlines, walls: Walls, pose: Pose, spec: GridSpec) -> Outlines:
     """The map with the points of one more view, measured from `pose`."""
     x, y = to_world(pose, walls.x, walls.y)
@@ -167,6 +170,7 @@ def shifted(values: Array, way: int, axis: int) -> Array:
     return moved.at[index].set(jnp.zeros((), values.dtype))
 
 
+@checked()
 def match(belief: Belief, walls: Walls, outlines: Outlines, spec: GridSpec) -> Belief:
     """The belief after the points of a view were laid onto the lines of the map.
 

@@ -52,7 +52,7 @@ class Mjx:
     name = "mjx"
 
     def __init__(self, model: Any, batch_size: int, options: Options):
-        self.batch_size = inputs.size("batch_size", batch_size)
+        self.batch_size = inputs.size("batch_size", batch_size, most=inputs.MOST_SIMULATIONS)
         self.model = load(model, free_joint=options.free_joint, watch=options.watch)
         self.watched = Watched.of(self.model, options.watch)
         self.watches = self.watched.names

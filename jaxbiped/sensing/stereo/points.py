@@ -25,13 +25,14 @@ class Points(NamedTuple):
     weight: Float32[np.ndarray, "N"]  # pixels: 1, or 0 where nothing was measured; such points lie at the origin
 
 
+@checked()
 def to_points(disparity: Disparity, camera: StereoCamera) -> Points:
     """Points of a disparity image: z = focal * baseline / (d + doffs), x = (u - cu) z / focal, y = (v - cv) z / focal.
 
     N = H W, always. Disparities that are not valid, not finite, or below 1/16 px of parallax have weight 0.
 
     Raises:
-      InputError: the image does not have the camera's size.
+      InputError: the image does not have the camera's size, or arrays of another shape or type.
     """
     height, width = disparity.value.shape
     if (width, height) != tuple(camera.size):
