@@ -161,7 +161,7 @@ def check_array(name: str, value: Any, kind: Any, sizes: Sizes, nan: bool) -> An
     array = checks.as_array(name, value)
     if kind.array_type is np.ndarray:
         if not checks.is_concrete(array):
-            raise InputError("must be known: the function runs on the host, outside of jax.jit and jax.vmap", field=name)
+            raise InputError("must be known: the function runs on the host, outside of jax.jit", field=name)
         array = np.asarray(array)
     what, good = allowed_dtype(kind, array)
     axes = [axis for axis in kind.dim_str.split() if not axis.startswith("*")]

@@ -12,6 +12,7 @@ Written for one arena.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import jax
@@ -20,6 +21,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.core.signatures import checked
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.geometry.small import matrix, product
 from jaxbiped.mapping.grid import GridSpec
@@ -88,7 +90,15 @@ def find_walls(view: View, shape: tuple[int, int], step: int, ground: Float[Arra
       shape: static; rows and columns of the picture that the points are of, one for each row of `view`, in order.
       step: static; rows from a point to the neighbours that it is compared with.
       ground: [m] height of the surface under the robot above the base floor.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a `shape` that is not of so many points, or a `step` that
+        is not within its rows.
     """
+    if math.prod(shape) != view.x.shape[0] or min(shape) < 1:
+        raise InputError(f"must be rows and columns of {view.x.shape[0]} points", field="shape", value=shape)
+    if not 1 <= step < max(shape[0], 2):
+        raise InputError(f"must be from 1 to {shape[0] - 1} rows", field="step", value=step)
     x, y, z = (v.reshape(shape) for v in (view.x, view.y, view.z))
     range_squared = x * x + y * y
     run = jnp.sqrt(range_squared)

@@ -14,6 +14,7 @@ from mujoco.batch import MODEL_FIELDS
 
 from jaxbiped.errors import InputError
 
+NOT_NEGATIVE = ("body_mass", "body_inertia", "geom_size", "geom_friction", "dof_armature", "dof_frictionloss")
 MOST_STEPS = 2**31 - 1  # of one call, whose engine counts in 32 bits
 MOST_SIMULATIONS = 10_000_000  # what no memory holds
 
@@ -124,5 +125,9 @@ def fields(
         raise InputError("must be {name: [B, ...]}", field="fields", value=type(values).__name__)
     for name, value in (values or {}).items():
         shape = own(model, field_name(model, name)).shape
-        out[name] = numbers(f"fields.{name}", value, (batch_size, *shape), f"[B, *{name}.shape]", mask)
+        array = numbers(f"fields.{name}", value, (batch_size, *shape), f"[B, *{name}.shape]", mask)
+        rows = array if mask is None else array[mask]
+        if name in NOT_NEGATIVE and (rows < 0).any():  # the engine would step on, and find no contact
+            raise InputError("must be 0 or more", field=f"fields.{name}", value=float(rows.min()))
+        out[name] = array
     return out

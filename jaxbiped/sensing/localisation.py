@@ -131,7 +131,11 @@ def correct(belief: Belief, landmarks: Landmarks, sightings: Sightings) -> Belie
     it, since after a long way without landmarks a heading may be some degrees off. Sightings that disagree with the
     belief by more than `GATE` are refused. Unseen slots, and sightings that are not finite, change nothing.
     """
-    slots = (landmarks.x, landmarks.y, landmarks.used, sightings.x, sightings.y, sightings.sd, sightings.seen)
+    numbers = (landmarks.x, landmarks.y, sightings.x, sightings.y, sightings.sd)
+    seen = landmarks.used & sightings.seen & jnp.isfinite(sum(numbers))
+    # Numbers of no meaning are 0: chosen away, NaN would still be in every derivative.
+    x, y, seen_x, seen_y, sd = (jnp.where(seen, values, 0.0) for values in numbers)
+    slots = (x, y, landmarks.used, seen_x, seen_y, sd, seen)
 
     def once(about: Belief, _) -> tuple[Belief, None]:
         return jax.lax.scan(lambda state, slot: (fuse(state, about.pose, *slot), None), belief, slots)[0], None

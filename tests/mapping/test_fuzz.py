@@ -129,9 +129,10 @@ def nearest_level():
 
 def gradient():
     """Of all evidence by the weight of each point: 1."""
-    evidence = lambda weight: UPDATE(
-        mapping.empty(SPEC), replace(VIEW, weight=weight), HERE, BODY, PARAMS
-    ).evidence.sum()  # noqa: E731, E501
+
+    def evidence(weight):
+        return UPDATE(mapping.empty(SPEC), replace(VIEW, weight=weight), HERE, BODY, PARAMS).evidence.sum()
+
     return close(jax.grad(evidence)(VIEW.weight), np.ones(4))
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float32
 
+from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.sensing.stereo.calibration import StereoCamera
 from jaxbiped.sensing.stereo.matching import Disparity
