@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxbiped.core.checks import finite
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.boxes import Boxes
 
