@@ -85,7 +85,7 @@ def bounds(array: np.ndarray | jax.Array) -> tuple[int, int]:
     return int(array.min()), int(array.max())
 
 
-def finite(name: str, value: Any, least: float | None = None, greatest: float | None = None) -> None:
+def finite(name: str, value: Any, least: float = -np.inf, greatest: float = np.inf) -> None:
     """Check that all numbers of an array are finite and within limits, where its values are concrete.
 
     Raises:
@@ -95,11 +95,10 @@ def finite(name: str, value: Any, least: float | None = None, greatest: float | 
     if not is_concrete(array) or not array.size:
         return
     numbers = np.asarray(array, np.float64)
-    good = np.isfinite(numbers)
-    good &= (numbers >= (-np.inf if least is None else least)) & (numbers <= (np.inf if greatest is None else greatest))
+    good = np.isfinite(numbers) & (numbers >= least) & (numbers <= greatest)
     if not good.all():
-        limits = f", {least:g} or more" if least is not None else ""
-        limits += f", {greatest:g} or less" if greatest is not None else ""
+        limits = f", {least:g} or more" if least > -np.inf else ""
+        limits += f", {greatest:g} or less" if greatest < np.inf else ""
         raise InputError(f"must be finite{limits}", field=name, value=float(numbers[~good][0]))
 
 

@@ -117,7 +117,7 @@ def is_checked(kind: Any) -> bool:
 
 
 def check_any(name: str, value: Any, kinds: tuple[Any, ...], sizes: Sizes, nan: bool) -> Any:
-    """A value of one of several annotations; Python's own numbers are scalars of an array beside them."""
+    """A value of one of several annotations; Python's own numbers, where they are among them, stay such numbers."""
     if value is None and type(None) in kinds:
         return None
     kinds = [kind for kind in kinds if kind is not type(None)]
@@ -125,9 +125,12 @@ def check_any(name: str, value: Any, kinds: tuple[Any, ...], sizes: Sizes, nan: 
     first = None
     for kind in tried:
         try:
-            return check(name, value, kind, sizes, nan)
+            checked_value = check(name, value, kind, sizes, nan)
         except InputError as error:
             first = first or error
+        else:
+            plain = [k for k in kinds if k in (bool, int, float)]
+            return plain[0](value) if plain and isinstance(value, (bool, int, float)) else checked_value
     if len(tried) > 1 and not is_array_kind(tried[0]):
         raise not_a(name, value, *tried)
     raise first

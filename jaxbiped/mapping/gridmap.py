@@ -166,7 +166,7 @@ def mark_footprint(
     Raises:
       InputError: an argument of another rank, shape or type, a level or a radius out of range, NaN in `grid_map`.
     """
-    checks.finite("level", level, 0, spec.ground_levels - 1)
+    checks.integers("level", level, between=(0, spec.ground_levels - 1))
     checks.finite("radius", radius, 0.0)
     rows, columns = (jnp.arange(n) for n in spec.shape)
     dx, dy = (columns + 0.5) * spec.pitch - x, ((rows + 0.5) * spec.pitch - y)[:, None]

@@ -181,7 +181,7 @@ def check_camera(camera: Camera) -> None:
     """
     for field in fields(camera):
         above = field.name in ("focal", "baseline", "max_disparity")
-        checks.finite(f"camera.{field.name}", getattr(camera, field.name), LEAST if above else None)
+        checks.finite(f"camera.{field.name}", getattr(camera, field.name), LEAST if above else -np.inf)
 
 
 def mount(camera: Camera, look: Bool[Array, ""] | bool = False, squat: Bool[Array, ""] | bool = False) -> Mount:

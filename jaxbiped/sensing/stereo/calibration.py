@@ -37,7 +37,7 @@ class StereoCamera:
     doffs: float = 0.0  # [px] column of the right principal point less that of the left; 0 for parallel cameras
 
     def __post_init__(self):
-        for name, least in (("focal", LEAST), ("baseline", LEAST), ("centre", None), ("doffs", None)):
+        for name, least in (("focal", LEAST), ("baseline", LEAST), ("centre", -np.inf), ("doffs", -np.inf)):
             checks.finite(name, getattr(self, name), least)
         for name in ("centre", "size"):
             if len(np.shape(getattr(self, name))) != 1 or len(getattr(self, name)) != 2:
