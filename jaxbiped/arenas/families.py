@@ -11,11 +11,15 @@ from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
 from jaxbiped.arenas.movers import Movers
 from jaxbiped.arenas.population import Population, given_or
+from jaxbiped.core import checks
+from jaxbiped.core.signatures import checked
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes, footprint_extent, plan_distance
 
 FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")  # that stand still
@@ -39,6 +43,7 @@ LANDMARKS_Y = (0.12, 1.28, 0.12, 1.28, 0.35, 1.05)
 LANDMARKS_KIND = (SQUARE, SQUARE, CIRCLE, CIRCLE, CIRCLE, CIRCLE)
 
 
+@checked()
 def sample(
     key: PRNGKeyArray,
     index: Int[Array, ""] | int,
@@ -53,7 +58,14 @@ def sample(
     Args:
       families: static; which families take turns.
       population: what is fixed and not drawn; all else of the arena stays as it is.
+
+    Raises:
+      InputError: a key that is none, an index below 0, no family, or one that is not known.
     """
+    checks.integers("index", index, between=(0, np.iinfo(np.int32).max))
+    unknown = [name for name in families if name not in LAYOUTS]
+    if unknown or not families:
+        raise InputError(f"must be of {', '.join(KNOWN)}", field="families", value=unknown[0] if unknown else ())
     turn = jnp.asarray(index) % len(families)
     # One draw feeds every part: each call of the generator costs compile time.
     u = jax.random.uniform(jax.random.fold_in(key, index), (DRAWS, MAX_BOXES))

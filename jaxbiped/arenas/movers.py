@@ -13,11 +13,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from jaxbiped.core.checks import finite
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.boxes import Boxes
 
 if TYPE_CHECKING:
     from jaxbiped.arenas.arena import Arena
 
+ARENA = {"Arena": "jaxbiped.arenas.arena"}  # which imports this module
 SHORTEST = 1e-3  # [m] a shorter way is none
 
 
@@ -32,8 +35,10 @@ class Movers:
     phase: Float[Array, "*B M"]  # at time 0: 0 at its place, 1 at the far end, up to 2 on its way back
 
 
+@checked(numbers=("time",), late=ARENA)
 def at_time(arena: Arena, time: Float[Array, ""] | float) -> Arena:
     """One arena as it is at a time [s] of its mission, with boxes that stand."""
+    finite("time", time)
     if arena.movers is None:
         return arena
     return replace(arena, boxes=boxes_at(arena, time), movers=None)
@@ -48,6 +53,7 @@ def boxes_at(arena: Arena, time: Float[Array, ""] | float) -> Boxes:
     return replace(boxes, x=boxes.x + part * movers.dx, y=boxes.y + part * movers.dy)
 
 
+@checked(late=ARENA)
 def only(arena: Arena, moving: bool) -> Arena:
     """One arena with only those of its boxes that move, or that stand. Those that stand are where they stand."""
     if arena.movers is None:

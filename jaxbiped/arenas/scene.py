@@ -13,6 +13,7 @@ import pydantic
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
 from jaxbiped.arenas.families import LANDMARKS_X, MAX_BOXES
 from jaxbiped.config import Model, load
+from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes
 
@@ -75,6 +76,7 @@ class SceneConfig(Model):
     landmarks: tuple[LandmarkConfig, ...] = ()
 
 
+@checked()
 def load_scene(path: str | Path) -> tuple[str, Arena]:
     """Name and arena of a scene file.
 
@@ -87,6 +89,7 @@ def load_scene(path: str | Path) -> tuple[str, Arena]:
     return scene.name, to_arena(scene)
 
 
+@checked()
 def to_arena(scene: SceneConfig) -> Arena:
     """The arena of a scene, padded to at least the slots of a random arena, so that both share compiled programs."""
     slots = max(MAX_BOXES, len(scene.boxes))

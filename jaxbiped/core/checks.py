@@ -85,6 +85,23 @@ def bounds(array: np.ndarray | jax.Array) -> tuple[int, int]:
     return int(array.min()), int(array.max())
 
 
+def finite(name: str, value: Any, least: float = -np.inf, greatest: float = np.inf) -> None:
+    """Check that all numbers of an array are finite and within limits, where its values are concrete.
+
+    Raises:
+      InputError: names the first number that is not.
+    """
+    array = as_array(name, value)
+    if not is_concrete(array) or not array.size:
+        return
+    numbers = np.asarray(array, np.float64)
+    good = np.isfinite(numbers) & (numbers >= least) & (numbers <= greatest)
+    if not good.all():
+        limits = f", {least:g} or more" if least > -np.inf else ""
+        limits += f", {greatest:g} or less" if greatest < np.inf else ""
+        raise InputError(f"must be finite{limits}", field=name, value=float(numbers[~good][0]))
+
+
 def cells(name: str, value: Any) -> np.ndarray | jax.Array:
     """Rows and columns [..., 2] as int32. What does not fit is outside any grid, and stays outside."""
     array = integers(name, value, "2")

@@ -13,10 +13,13 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
-from jaxbiped.mapping.grid import Body, Cell, GridSpec
+from jaxbiped.core import checks
+from jaxbiped.core.signatures import checked
+from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body
 from jaxbiped.mapping.params import MapParams
 
 
+@checked(numbers=("evidence", "body", "params"))
 def c_obstacles(
     evidence: Float[Array, "H W Z"], body: Body, params: MapParams, spec: GridSpec
 ) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
@@ -31,8 +34,15 @@ def c_obstacles(
     - bump, when its ground is above level 0;
     - floor.
     No cell is unmeasured here: one without points is read as base floor, within the reach of its neighbours. That is
-    `classify`'s to say. Beyond the rim of the grid nothing is occupied.
+    `classify`'s to say. Beyond the rim of the grid nothing is occupied. Under `jit`, where values are not known, NaN
+    compares false, and a radius beyond `spec.max_radius` is cut to that.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, evidence that is not finite, a body that
+        `grid.check_body` refuses, NaN in `params`.
     """
+    check_body(body, spec)
+    checks.finite("evidence", evidence)
     columns = occupied_levels(evidence, params, spec)
     ground = ground_level(columns, evidence, spec)
     return read_cells(solid_levels(columns, evidence, params, spec), ground, body, params.head_margin, spec)

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.geometry.pose import Pose, to_robot
-from jaxbiped.mapping.grid import GridSpec
+from jaxbiped.mapping.grid import GridSpec, flat_index
 from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, T_robot_camera
 from jaxbiped.sensing.view import View
 
@@ -109,4 +109,4 @@ def project(
     row = jnp.floor((image.centre[1] + scale * down + 0.5) / image.stride[1])
     inside = (depth >= near) & (column >= 0) & (column < image.columns) & (row >= 0) & (row < image.rows)
     inside &= u >= scale * camera.baseline  # the right camera has it in view, too
-    return depth, jnp.where(inside, row * image.columns + column, 0.0).astype(jnp.int32), inside
+    return depth, flat_index(inside, (row, column), (image.rows, image.columns)), inside

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import jax
-from jaxtyping import Array, Float
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.core import checks
 from jaxbiped.errors import InputError
 
+EXACT = 2**24  # integers up to here are float32 numbers
 MOST_CELLS = 4_000_000  # of a grid: more than a map of this kind ever has, and what memory holds
 
 
@@ -33,8 +37,8 @@ class GridSpec:
     index k is level k + `lowest`.
 
     Raises:
-      InputError: the pitch does not divide the area, a column does not fit a 32-bit mask, or there is no room
-        for the ground.
+      InputError: a field of another type, the pitch does not divide the area, a column does not fit a 32-bit mask, or
+        there is no room for the ground.
     """
 
     size_x: float = 1.80  # [m]
@@ -47,6 +51,12 @@ class GridSpec:
     max_radius: float = 0.15  # [m] largest radius of a body that this grid is read for
 
     def __post_init__(self):
+        for field in fields(self):
+            value, whole = getattr(self, field.name), isinstance(field.default, int)
+            kinds = (int, np.integer) if whole else (int, float, np.integer, np.floating)
+            if isinstance(value, bool) or not isinstance(value, kinds):
+                shown = value if isinstance(value, (bool, float, str)) else type(value).__name__
+                raise InputError(f"must be {'an integer' if whole else 'a number'}", field=field.name, value=shown)
         for name in ("size_x", "size_y"):
             size = getattr(self, name)
             cells = size / self.pitch if self.pitch > 0 else math.nan
@@ -75,6 +85,11 @@ class GridSpec:
         return round(self.size_y / self.pitch), round(self.size_x / self.pitch)
 
     @property
+    def axis_sizes(self) -> dict[str, int]:
+        """Sizes of the axes of what lies on this grid, by their letters."""
+        return {"H": self.shape[0], "W": self.shape[1], "Z": self.levels, "G": self.ground_levels}
+
+    @property
     def cell_share(self) -> float:
         """A cell's area as a share of 5 x 5 cm, the cell that thresholds on numbers of points are stated for."""
         return (self.pitch / 0.05) ** 2
@@ -89,3 +104,29 @@ class Body:
     standing: Float[Array, "*B"]  # [m] head height, standing
     squatting: Float[Array, "*B"]  # [m] head height, squatting
     step: Float[Array, "*B"]  # [m] greatest height of one step up or down
+
+
+def check_body(body: Body, spec: GridSpec) -> None:
+    """Check the numbers of a body, where they are concrete, against a grid that is read for it.
+
+    Raises:
+      InputError: a number below 0 or not finite, or a radius beyond `GridSpec.max_radius`.
+    """
+    checks.finite("body.radius", body.radius, 0.0, spec.max_radius * (1 + 1e-6))  # as a float32 it may be rounded up
+    for name in ("standing", "squatting", "step"):
+        checks.finite(f"body.{name}", getattr(body, name), 0.0)
+
+
+def flat_index(
+    inside: Bool[Array, "*S"], places: tuple[Float[Array, "*S"], ...], sizes: tuple[int, ...]
+) -> Int[Array, "*S"]:
+    """Index [int32] into a flattened array of places along its axes (whole numbers); 0 for those not `inside`.
+
+    In float32 where all indices are exact there, which costs one conversion; else by integers.
+    """
+    if math.prod(sizes) > EXACT:
+        places = tuple(jnp.where(inside, place, 0.0).astype(jnp.int32) for place in places)
+    index = places[0]
+    for place, size in zip(places[1:], sizes[1:], strict=True):
+        index = index * size + place
+    return jnp.where(inside, index, 0).astype(jnp.int32)

@@ -8,10 +8,12 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from jaxbiped.core import checks
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_world
 from jaxbiped.mapping.cobstacles import c_obstacles
 from jaxbiped.mapping.fading import Eye, forget
-from jaxbiped.mapping.grid import Body, Cell, GridSpec
+from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, flat_index
 from jaxbiped.mapping.leveling import level_view
 from jaxbiped.mapping.params import MapParams
 from jaxbiped.sensing.view import View
@@ -29,6 +31,7 @@ class GridMap:
     level_votes: Float[Array, "*B H W G"]  # for each ground level
 
 
+@checked()
 def empty(spec: GridSpec) -> GridMap:
     """The map of one arena before the first view."""
     return GridMap(
@@ -38,6 +41,7 @@ def empty(spec: GridSpec) -> GridMap:
     )
 
 
+@checked(numbers=("grid_map", "body", "params"))
 def update(
     grid_map: GridMap,
     view: View,
@@ -60,7 +64,15 @@ def update(
     Deviations, found necessary on rendered stereo: voxels and cells with very few points do not count (`MapConfig`).
 
     Points that are not finite, beyond `params.max_range` or outside the grid count nothing.
+
+    Under `jit`, where values are not known, a NaN in `body` or `params` compares false, and a radius beyond
+    `spec.max_radius` is cut to that.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a body that `grid.check_body` refuses, NaN in `grid_map`,
+        `body` or `params`.
     """
+    check_body(body, spec)
     if refit:
         view = level_view(view, jnp.round(pose.z / spec.level_height).astype(jnp.int32), params, spec)
         # Without this the compiler solves for the plane again at every point (a third of the time of an update).
@@ -86,7 +98,7 @@ def voxelise(view: View, pose: Pose, params: MapParams, spec: GridSpec) -> Float
     # Comparisons with NaN are false: whatever is not finite fails one of these.
     counts = (view.weight > 0) & (view.weight < jnp.inf) & (view.x**2 + view.y**2 < params.max_range**2)
     counts &= (row >= 0) & (row < height) & (column >= 0) & (column < width) & (voxel >= 0) & (voxel < depth)
-    index = jnp.where(counts, (row * width + column) * depth + voxel, 0.0).astype(jnp.int32)
+    index = flat_index(counts, (row, column, voxel), (height, width, depth))
     flat = jnp.zeros(height * width * depth)
     flat = flat.at[index].add(jnp.where(counts, view.weight, 0.0), mode="promise_in_bounds")
     return flat.reshape(height, width, depth)
@@ -106,12 +118,16 @@ def add_votes(
     )
 
 
+@checked(numbers=("grid_map", "params"))
 def classify(grid_map: GridMap, params: MapParams, spec: GridSpec) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
     """Classes (int8, `Cell`) and ground levels (int8) of one arena: the majority of all votes.
 
     A cell with fewer than `params.fused_points` votes is unmeasured. A tie goes to the class that is harder to cross.
     A floor cell has level 0 and a bump cell the raised level with most votes; others have the level with most votes
-    (a tie goes to the lower).
+    (a tie goes to the lower). Under `jit` NaN compares false.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, or with NaN.
     """
     votes = [grid_map.votes[..., k] for k in range(4)]
     level_votes = [grid_map.level_votes[..., k] for k in range(spec.ground_levels)]
@@ -132,6 +148,7 @@ def first_greatest(values: list[Float[Array, "H W"]]) -> Int[Array, "H W"]:
     return index
 
 
+@checked(numbers=("grid_map", "radius"))
 def mark_footprint(
     grid_map: GridMap,
     x: Float[Array, ""] | float,
@@ -144,8 +161,13 @@ def mark_footprint(
 
     Cells whose centre lies within `radius` [m], and the one that holds the point, get `FOOTPRINT_POINTS` of evidence
     at that level, and as many votes: for floor at level 0, else for bump. A place that is not finite, or outside the
-    grid, marks nothing beyond the rim.
+    grid, marks nothing beyond the rim. Under `jit` a level that is no ground level counts as the nearest that is.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a level or a radius out of range, NaN in `grid_map`.
     """
+    checks.integers("level", level, between=(0, spec.ground_levels - 1))
+    checks.finite("radius", radius, 0.0)
     rows, columns = (jnp.arange(n) for n in spec.shape)
     dx, dy = (columns + 0.5) * spec.pitch - x, ((rows + 0.5) * spec.pitch - y)[:, None]
     own = jnp.maximum(jnp.abs(dx), jnp.abs(dy)) <= spec.pitch / 2

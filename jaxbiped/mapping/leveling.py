@@ -10,6 +10,7 @@ from dataclasses import replace
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
+from jaxbiped.core.signatures import checked
 from jaxbiped.mapping.grid import GridSpec
 from jaxbiped.mapping.params import MapParams
 from jaxbiped.sensing.view import View
@@ -23,6 +24,7 @@ PRIOR_PIXELS, PRIOR_OFFSET, PRIOR_SLOPE, PIXEL_SD = 50.0, 0.01, 0.026, 0.004
 SAMPLE = 1000  # points that the fit is made of, at least where a view has as many
 
 
+@checked(numbers=("params",))
 def level_view(view: View, support: Int[Array, ""] | int, params: MapParams, spec: GridSpec) -> View:
     """One view brought level by the floor that it sees: turned about the robot's foot, so that the floor lies flat.
 
@@ -34,6 +36,9 @@ def level_view(view: View, support: Int[Array, ""] | int, params: MapParams, spe
     `params.refit_points` pixels lie on it.
 
     Points with weight 0, and points that are not finite, take no part. Deviation: the paper does not refit.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, or NaN in `params` (which under `jit` refuses the refit).
     """
     plane = fit_floor(view, jnp.asarray(support, jnp.float32), params, spec)
     offset, slope_x, slope_y = plane

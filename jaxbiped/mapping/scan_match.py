@@ -12,6 +12,7 @@ Written for one arena.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import jax
@@ -19,6 +20,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.core.signatures import checked
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.geometry.small import matrix, product
 from jaxbiped.mapping.grid import GridSpec
@@ -79,6 +82,7 @@ def no_outlines(spec: GridSpec) -> Outlines:
     return Outlines(jnp.zeros(spec.shape), jnp.zeros((*spec.shape, 2)), jnp.zeros((*spec.shape, 3)))
 
 
+@checked()
 def find_walls(view: View, shape: tuple[int, int], step: int, ground: Float[Array, ""]) -> Walls:
     """The points of a level view on upright surfaces: those that lie above or below a neighbour, not behind it.
 
@@ -86,7 +90,15 @@ def find_walls(view: View, shape: tuple[int, int], step: int, ground: Float[Arra
       shape: static; rows and columns of the picture that the points are of, one for each row of `view`, in order.
       step: static; rows from a point to the neighbours that it is compared with.
       ground: [m] height of the surface under the robot above the base floor.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a `shape` that is not of so many points, or a `step` that
+        is not within its rows.
     """
+    if math.prod(shape) != view.x.shape[0] or min(shape) < 1:
+        raise InputError(f"must be rows and columns of {view.x.shape[0]} points", field="shape", value=shape)
+    if not 1 <= step < max(shape[0], 2):
+        raise InputError(f"must be from 1 to {shape[0] - 1} rows", field="step", value=step)
     x, y, z = (v.reshape(shape) for v in (view.x, view.y, view.z))
     range_squared = x * x + y * y
     run = jnp.sqrt(range_squared)
@@ -110,6 +122,7 @@ def thinned(walls: Walls, shape: tuple[int, int]) -> Walls:
     return jax.tree.map(lambda v: jnp.zeros(MOST, v.dtype).at[place].set(v, mode="drop"), walls)
 
 
+@checked()
 def add_walls(outlines: Outlines, walls: Walls, pose: Pose, spec: GridSpec) -> Outlines:
     """The map with the points of one more view, measured from `pose`."""
     x, y = to_world(pose, walls.x, walls.y)
@@ -167,6 +180,7 @@ def shifted(values: Array, way: int, axis: int) -> Array:
     return moved.at[index].set(jnp.zeros((), values.dtype))
 
 
+@checked()
 def match(belief: Belief, walls: Walls, outlines: Outlines, spec: GridSpec) -> Belief:
     """The belief after the points of a view were laid onto the lines of the map.
 

@@ -6,22 +6,28 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.boxes import Boxes, covers, ground_height
 from jaxbiped.mapping.cobstacles import read_cells
-from jaxbiped.mapping.grid import Body, GridSpec
+from jaxbiped.mapping.grid import Body, GridSpec, check_body
 
 SAMPLES = 5  # a cell is sampled at 5 x 5 places
 LEAST_SHARE = 0.05  # a level is occupied in a cell when something stands there in over this share of its places
 
 
+@checked(numbers=("body",))
 def truth_grid(arena: Arena, spec: GridSpec, body: Body) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
     """Classes (int8) and ground levels (int8) of one arena, known perfectly, by the rule of `c_obstacles`.
 
     Each cell is sampled at 5 x 5 places. A level is occupied where over 5 % of them hold a box at that level; the
     ground is the level of most places (a tie goes to the higher one), and level 0 where most are too high to stand on.
     A box fills the levels from that of its bottom (the floor, for one that stands) to that of its top. No cell is
-    unmeasured.
+    unmeasured. A box of which a number is NaN stands nowhere.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, or a body that `grid.check_body` refuses.
     """
+    check_body(body, spec)
     (height, width), n = spec.shape, SAMPLES
     y = (jnp.arange(height * n) + 0.5) * (spec.pitch / n)
     x = (jnp.arange(width * n) + 0.5) * (spec.pitch / n)

@@ -16,6 +16,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from jaxbiped.core.checks import as_array, shape_of
+from jaxbiped.errors import InputError
+
 WARNINGS = (
     "inertia",
     "contact_full",
@@ -133,5 +136,12 @@ class Backend(Protocol):
 
 
 def explain(warnings: Sequence[int] | np.ndarray) -> str:
-    """The warnings of one simulation, [8], in words; empty where there were none."""
+    """The warnings of one simulation, [8], in words; empty where there were none.
+
+    Raises:
+      InputError: of another shape, or no numbers.
+    """
+    counts = as_array("warnings", warnings)
+    if counts.shape != (len(WARNINGS),):
+        raise InputError(f"must be [{len(WARNINGS)}], of one simulation, not {shape_of(counts)}", field="warnings")
     return ", ".join(f"{name} x{count}" for name, count in zip(WARNINGS, warnings, strict=True) if count)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float64
@@ -12,11 +14,17 @@ from mujoco.batch import MODEL_FIELDS
 
 from jaxbiped.errors import InputError
 
+NOT_NEGATIVE = ("body_mass", "body_inertia", "geom_size", "geom_friction", "dof_armature", "dof_frictionloss")
+MOST_STEPS = 2**31 - 1  # of one call, whose engine counts in 32 bits
+MOST_SIMULATIONS = 10_000_000  # what no memory holds
 
-def size(name: str, value: Any, least: int = 1) -> int:
-    """A whole number of at least `least`."""
+
+def size(name: str, value: Any, least: int = 1, most: int = MOST_STEPS) -> int:
+    """A whole number of at least `least` and at most `most`."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise InputError(f"must be a whole number of at least {least}", field=name, value=value)
+    if value > most:
+        raise InputError(f"must be at most {most:,}", field=name, value=value)
     return int(value)
 
 
@@ -24,9 +32,15 @@ def numbers(
     name: str, value: Any, shape: tuple[int, ...], axes: str, mask: Bool[np.ndarray, "B"] | None = None
 ) -> Float64[np.ndarray, "..."]:
     """`value` as finite float64 of `shape`, where -1 is any length; only the rows of the mask need be finite."""
+    if isinstance(value, jax.core.Tracer):
+        message = "must be known: simulations run on the host, outside of jax.jit, jax.vmap and jax.grad"
+        raise InputError(message, field=name)
     try:
-        array = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
+        array = np.asarray(value)
+        if array.dtype.kind not in "biuf" and not jnp.issubdtype(array.dtype, jnp.floating):
+            raise TypeError
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"must be numbers of shape {axes}", field=name, value=value) from None
     if array.ndim != len(shape) or any(want not in (-1, got) for want, got in zip(shape, array.shape, strict=True)):
         wanted = ", ".join("any" if n == -1 else str(n) for n in shape)
@@ -66,6 +80,8 @@ def every(count: int, record_every: int | None, hold: int) -> tuple[int, int]:
     """Steps a record (all of them where None) and steps a control, of a table of `count` controls."""
     hold = size("hold", hold)
     steps = count * hold
+    if steps > MOST_STEPS:
+        raise InputError(f"must give at most {MOST_STEPS:,} steps in all", field="hold", value=hold)
     interval = steps if record_every is None else size("record_every", record_every)
     if steps % interval:
         raise InputError(f"must divide the {steps} steps of the rollout", field="record_every", value=record_every)
@@ -76,7 +92,10 @@ def chosen(mask: Any, batch_size: int) -> Bool[np.ndarray, "B"]:
     """A mask of simulations; all where it is None."""
     if mask is None:
         return np.ones(batch_size, bool)
-    array = np.asarray(mask)
+    try:
+        array = np.asarray(mask)
+    except (TypeError, ValueError):  # ragged, or traced
+        array = np.empty(0)
     if array.dtype != bool or array.shape != (batch_size,):
         raise InputError(f"must be [B] = [{batch_size}] booleans", field="mask", value=mask)
     return array
@@ -90,7 +109,7 @@ def own(model: mujoco.MjModel, name: str) -> np.ndarray:
 
 def field_name(model: mujoco.MjModel, name: str) -> str:
     """A field that may differ by simulation: real numbers, of no consequence for sizes, time or names."""
-    if name not in MODEL_FIELDS:
+    if not isinstance(name, str) or name not in MODEL_FIELDS:
         raise InputError("must be the name of a field of mujoco.MjModel that has one value a simulation", field=name)
     if own(model, name).dtype.kind != "f" or name in ("opt.timestep", "numeric_data"):
         raise InputError("is the same in all simulations of a batch", field=name)
@@ -102,7 +121,13 @@ def fields(
 ) -> dict[str, Float64[np.ndarray, "B ..."]]:
     """Model fields by name, each with a leading [B]."""
     out = {}
+    if values is not None and not isinstance(values, Mapping):
+        raise InputError("must be {name: [B, ...]}", field="fields", value=type(values).__name__)
     for name, value in (values or {}).items():
         shape = own(model, field_name(model, name)).shape
-        out[name] = numbers(f"fields.{name}", value, (batch_size, *shape), f"[B, *{name}.shape]", mask)
+        array = numbers(f"fields.{name}", value, (batch_size, *shape), f"[B, *{name}.shape]", mask)
+        rows = array if mask is None else array[mask]
+        if name in NOT_NEGATIVE and (rows < 0).any():  # the engine would step on, and find no contact
+            raise InputError("must be 0 or more", field=f"fields.{name}", value=float(rows.min()))
+        out[name] = array
     return out

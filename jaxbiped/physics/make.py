@@ -30,7 +30,7 @@ def make(name: str, model: Any, batch_size: int, **options: Any) -> Backend:
       InputError: about an unknown name or option, a model that cannot be stepped (with what is in it that cannot), or
         a device that is asked for and not there.
     """
-    if name not in BACKENDS:
+    if not isinstance(name, str) or name not in BACKENDS:
         raise InputError(f"must be one of {', '.join(BACKENDS)}", field="backend", value=name)
     if name == "auto":
         device = options.get("device")

@@ -52,7 +52,7 @@ class Mjx:
     name = "mjx"
 
     def __init__(self, model: Any, batch_size: int, options: Options):
-        self.batch_size = inputs.size("batch_size", batch_size)
+        self.batch_size = inputs.size("batch_size", batch_size, most=inputs.MOST_SIMULATIONS)
         self.model = load(model, free_joint=options.free_joint, watch=options.watch)
         self.watched = Watched.of(self.model, options.watch)
         self.watches = self.watched.names
@@ -141,6 +141,7 @@ class Mjx:
         """See `Backend.advance`."""
         table = inputs.controls(controls, self.batch_size, self.model)
         steps, hold = inputs.every(table.shape[1], None, hold)
+        chosen = inputs.chosen(mask, self.batch_size)
         depth, data, warned = self.untouched(), self.data, self.warned
         if self.overrides is None:
             self.overrides = self.overridden(self.living)
@@ -148,7 +149,6 @@ class Mjx:
             self.data, self.warned, depth, _ = self.block(
                 self.engine.model, self.overrides, self.data, self.warned, depth, block, np.int32(count)
             )
-        chosen = inputs.chosen(mask, self.batch_size)
         if not chosen.all():
             others = (self.warned, warned), (depth, self.untouched())
             self.data, self.warned, depth = self.keep(chosen, self.data, data, *others)

@@ -37,7 +37,7 @@ class Native:
     name = "native"
 
     def __init__(self, model: Any, batch_size: int, options: Options):
-        self.batch_size = inputs.size("batch_size", batch_size)
+        self.batch_size = inputs.size("batch_size", batch_size, most=inputs.MOST_SIMULATIONS)
         self.model = load(model, free_joint=options.free_joint, watch=options.watch)
         # A simulation that blew up must stay so, not start anew from its default with status 0.
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET

@@ -7,7 +7,7 @@ their parameter is the depth, and disparity = focal * baseline / depth. (Paper, 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import jax
@@ -17,8 +17,12 @@ from jaxtyping import Array, Bool, Float
 from pydantic import Field, model_validator
 
 from jaxbiped.config import Model
+from jaxbiped.core import checks
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.geometry.small import matrix, product
+
+LEAST = 1e-6  # of what must be above 0 in a camera
 
 
 @dataclass(frozen=True)
@@ -27,12 +31,27 @@ class ImageSpec:
 
     Rays go through the centres of equal blocks of pixels. Pixel (0, 0) has its centre at (0, 0) and the
     principal point is the middle of the image.
+
+    Raises:
+      InputError: a field that is no integer of 1 or more, or more rays than pixels.
     """
 
     width: int = 512  # [px]
     height: int = 384  # [px]
     columns: int = 64  # rays across
     rows: int = 48  # rays down
+
+    def __post_init__(self):
+        for rays, pixels in (("columns", "width"), ("rows", "height")):
+            most = checks.whole_number(pixels, getattr(self, pixels), 1)
+            if checks.whole_number(rays, getattr(self, rays), 1) > most:
+                message = f"must be at most the {pixels} of {most} pixels"
+                raise InputError(message, field=rays, value=getattr(self, rays))
+
+    @property
+    def axis_sizes(self) -> dict[str, int]:
+        """Sizes of the axes of what has a value for each ray."""
+        return {"rows": self.rows, "columns": self.columns}
 
     @property
     def stride(self) -> tuple[float, float]:
@@ -152,6 +171,17 @@ class CameraConfig(Model):
             "max_disparity": self.num_disparities - 1,
         }
         return Camera(**{name: jnp.asarray(value, jnp.float32) for name, value in values.items()})
+
+
+def check_camera(camera: Camera) -> None:
+    """Check the numbers of a camera, where they are concrete.
+
+    Raises:
+      InputError: a number that is not finite; no focal length, baseline, or range of disparities above 0.
+    """
+    for field in fields(camera):
+        above = field.name in ("focal", "baseline", "max_disparity")
+        checks.finite(f"camera.{field.name}", getattr(camera, field.name), LEAST if above else -np.inf)
 
 
 def mount(camera: Camera, look: Bool[Array, ""] | bool = False, squat: Bool[Array, ""] | bool = False) -> Mount:

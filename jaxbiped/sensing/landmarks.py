@@ -15,12 +15,14 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, UInt32
 from pydantic import Field
 
-from jaxbiped.arenas.arena import SQUARE, Arena
+from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena
 from jaxbiped.config import Model
+from jaxbiped.core import checks
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.geometry.rays import cast_boxes, nearness
 from jaxbiped.sensing import hashing
-from jaxbiped.sensing.camera import Camera, ImageSpec, mount, placed
+from jaxbiped.sensing.camera import Camera, ImageSpec, check_camera, mount, placed
 from jaxbiped.sensing.view import Sightings
 
 LANDMARK = 4  # channel of a view's seed
@@ -68,6 +70,7 @@ IDEAL = LandmarkConfig(sd=0.001, sd_per_metre=0)
 REAL = LandmarkConfig(sd=0.004, sd_per_metre=0.008)
 
 
+@checked(numbers=("camera", "noise"))
 def sight(
     arena: Arena,
     pose: Pose,
@@ -80,8 +83,15 @@ def sight(
 ) -> Sightings:
     """Landmarks of one arena as seen from the true `pose`; the channel LANDMARK of the view's `seed` is used.
 
-    Unseen ones are at the origin; none is seen from a pose that is not finite.
+    Unseen ones are at the origin; none is seen from a pose that is not finite. Under `jit` what is no `SQUARE` is a
+    circle.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a kind that is none, a camera that `check_camera` refuses,
+        NaN in `noise`.
     """
+    check_camera(camera)
+    checks.integers("arena.landmarks.kind", arena.landmarks.kind, between=(CIRCLE, SQUARE))
     marks = arena.landmarks
     level = jnp.zeros_like(pose.yaw)
     origin, basis = placed(pose, mount(camera, look, squat), level, level)

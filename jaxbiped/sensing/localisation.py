@@ -15,6 +15,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxbiped.arenas.arena import Landmarks
+from jaxbiped.core.checks import finite
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.geometry.small import matrix, product
 from jaxbiped.sensing.view import Motion, Sightings
@@ -34,11 +36,13 @@ class Belief:
     cov: Float[Array, "*B 3 3"]  # of (x, y, yaw) [m, m, rad], world frame
 
 
+@checked()
 def known(pose: Pose) -> Belief:
     """The belief of a robot that knows its pose."""
     return Belief(pose, jnp.zeros((3, 3)))
 
 
+@checked(numbers=("dx", "dy", "dyaw", "variances"))
 def predict(
     belief: Belief,
     dx: Float[Array, ""],
@@ -49,7 +53,14 @@ def predict(
     """The belief after a displacement (dx, dy, dyaw) in the robot frame before it, as odometry tells it.
 
     `variances` [m^2, m^2, rad^2] are those of the displacement's own error, in that frame.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a displacement that is not finite, or variances that are
+        not 0 or more. (Under `jit` such a belief is no belief: NaN in it stays.)
     """
+    for name, value in (("dx", dx), ("dy", dy), ("dyaw", dyaw)):
+        finite(name, value)
+    finite("variances", variances, 0.0)
     after, F, G = displaced(belief.pose, dx, dy, dyaw)
     return Belief(after, product(product(F, belief.cov), F.T) + product(G * variances, G.T))
 
@@ -65,6 +76,7 @@ def displaced(
     return Pose(x, y, pose.z, wrap_angle(pose.yaw + dyaw)), F, G
 
 
+@checked(numbers=("moved", "variances"))
 def predict_seen(
     belief: Belief, moved: Float[Array, "3"], variances: Float[Array, "3"], motion: Motion
 ) -> tuple[Belief, Bool[Array, ""]]:
@@ -111,6 +123,7 @@ def wrap_last(difference: Float[Array, "3"]) -> Float[Array, "3"]:
     return difference.at[2].set(wrap_angle(difference[2]))
 
 
+@checked()
 def correct(belief: Belief, landmarks: Landmarks, sightings: Sightings) -> Belief:
     """The belief after the landmarks seen, fused one after the other.
 
@@ -118,7 +131,11 @@ def correct(belief: Belief, landmarks: Landmarks, sightings: Sightings) -> Belie
     it, since after a long way without landmarks a heading may be some degrees off. Sightings that disagree with the
     belief by more than `GATE` are refused. Unseen slots, and sightings that are not finite, change nothing.
     """
-    slots = (landmarks.x, landmarks.y, landmarks.used, sightings.x, sightings.y, sightings.sd, sightings.seen)
+    numbers = (landmarks.x, landmarks.y, sightings.x, sightings.y, sightings.sd)
+    seen = landmarks.used & sightings.seen & jnp.isfinite(sum(numbers))
+    # Numbers of no meaning are 0: chosen away, NaN would still be in every derivative.
+    x, y, seen_x, seen_y, sd = (jnp.where(seen, values, 0.0) for values in numbers)
+    slots = (x, y, landmarks.used, seen_x, seen_y, sd, seen)
 
     def once(about: Belief, _) -> tuple[Belief, None]:
         return jax.lax.scan(lambda state, slot: (fuse(state, about.pose, *slot), None), belief, slots)[0], None

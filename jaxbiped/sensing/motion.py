@@ -16,6 +16,7 @@ from jaxtyping import Array, Float, UInt32
 from pydantic import Field
 
 from jaxbiped.config import Model
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.sensing import hashing
 from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
@@ -73,6 +74,7 @@ def nothing() -> Motion:
     return Motion(zero, zero, zero, jnp.zeros((3, 3)), jnp.zeros((), bool))
 
 
+@checked(numbers=("at", "camera", "noise", "max_range"))
 def track(
     view: View,
     pose: Pose,

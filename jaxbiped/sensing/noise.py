@@ -217,7 +217,7 @@ def hidden_from_right(
     seen_at = image.u - disparity[1:-1, 1:-1]
     least = jnp.pad(seen_at[:, 1:], ((0, 0), (0, 1)), constant_values=np.inf)
     while window * image.stride[0] < HIDING_REACH:  # the least of the next 1, 2, 4, ... columns
-        further = jnp.pad(least[:, window:], ((0, 0), (0, window)), constant_values=np.inf)
+        further = jnp.pad(least[:, window:], ((0, 0), (0, min(window, image.columns))), constant_values=np.inf)
         # Without the barrier XLA fuses the steps, and computes each element's whole tree of minima by itself; a minimum
         # that carries NaN along, as `jnp.minimum`, is four times slower.
         least, window = jax.lax.optimization_barrier(jnp.where(further < least, further, least)), 2 * window

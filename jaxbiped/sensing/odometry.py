@@ -19,6 +19,8 @@ from jaxtyping import Array, Float, UInt32
 from pydantic import Field
 
 from jaxbiped.config import Model
+from jaxbiped.core.checks import finite
+from jaxbiped.core.signatures import checked
 from jaxbiped.sensing import hashing
 
 ODOMETRY = 5  # channel of a step's seed
@@ -60,6 +62,7 @@ class OdometryConfig(Model):
 Displacement = tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]
 
 
+@checked(numbers=("displacement", "noise"))
 def drift(
     displacement: Displacement, noise: OdometryNoise, seed: UInt32[Array, ""]
 ) -> tuple[Displacement, Float[Array, "3"]]:
@@ -67,8 +70,14 @@ def drift(
 
     Read it as what odometry counted of a true motion, or as what became of an intended one. The error's axes are
     those of the robot frame before the step; no motion, no error. The variances [m^2, m^2, rad^2] are what
-    `localisation.predict` wants. The channel ODOMETRY of `seed` is used.
+    `localisation.predict` wants. The channel ODOMETRY of `seed` is used. Without any motion there is no derivative:
+    the error grows with the square root of the way.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a displacement that is not finite, NaN in `noise`.
     """
+    for i, part in enumerate(displacement):
+        finite(f"displacement[{i}]", part)
     dx, dy, dyaw = displacement
     walked, turned = jnp.sqrt(dx * dx + dy * dy), jnp.abs(dyaw)
     yaw = noise.yaw_walked * noise.yaw_walked * walked + noise.yaw_turned * noise.yaw_turned * turned

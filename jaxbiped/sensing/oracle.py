@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import math
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.checks import finite, whole_number
+from jaxbiped.core.signatures import checked
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes, covers
 from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.sensing.view import View
 
+LEAST = 1e-6  # [m] of what must be above 0
+MOST_POINTS = 100_000_000  # of a view: what memory holds
 
+
+@checked()
 def measure(
     arena: Arena,
     pose: Pose,
@@ -35,7 +44,17 @@ def measure(
 
     Returns:
       `columns * (1 + levels)` points; weight 0 where a level is empty, and everywhere when the pose is not finite.
+
+    Raises:
+      InputError: an argument of another rank, shape or type; a size, spacing, height or number of levels that is not
+        above 0, a weight below 0, or more than `MOST_POINTS` points.
     """
+    for name, value in (("size_xy", size_xy), ("spacing", spacing), ("level_height", level_height)):
+        finite(name, value, LEAST)
+    finite("weight", weight, 0.0)
+    points = math.prod(size / spacing for size in size_xy) * (1 + whole_number("levels", levels, 1))
+    if not points <= MOST_POINTS:
+        raise InputError(f"must give at most {MOST_POINTS:,} points", field="spacing", value=spacing)
     axes = ((np.arange(round(size / spacing), dtype=np.float32) + 0.5) * np.float32(spacing) for size in size_xy)
     x, y = (jnp.asarray(values.reshape(-1)) for values in np.meshgrid(*axes))
     ground, ceiling, cover = heights(arena.boxes, x, y)

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from jaxbiped import config
 from jaxbiped.config import Model
+from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.sensing import landmarks, noise
 from jaxbiped.sensing.landmarks import LandmarkConfig
@@ -44,6 +45,7 @@ PRESETS = {
 }
 
 
+@checked()
 def sensor_preset(name: str) -> SensorConfig:
     """The preset of this name, or the sensor file of this path; raises `InputError` when it is neither."""
     if name in PRESETS:

@@ -7,14 +7,16 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int32, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.geometry.rays import cast_boxes, cast_floor, key, marked, nearness
 from jaxbiped.sensing import noise as stereo
-from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, mount, placed, rays
+from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, check_camera, mount, placed, rays
 from jaxbiped.sensing.noise import StereoNoise
 from jaxbiped.sensing.view import View
 
 
+@checked(numbers=("camera", "noise"))
 def measure(
     arena: Arena,
     pose: Pose,
@@ -32,7 +34,11 @@ def measure(
     robot, else drawn by the view's seed. Points are reprojected as if it were upright (`View`). `look` tilts the
     camera to the feet, `squat` lowers it. Rays that measured nothing, or a range beyond `noise.max_range`, have weight
     0 and lie at the origin; so do all when the pose is not finite.
+
+    Raises:
+      InputError: an argument of another rank, shape or type, a camera that `check_camera` refuses, NaN in `noise`.
     """
+    check_camera(camera)
     at = mount(camera, look, squat)
     textured = arena.boxes.contrast >= noise.min_contrast, arena.floor_contrast >= noise.min_contrast
     roll, pitch = stereo.attitude_error(noise, seed) if attitude is None else attitude

@@ -11,16 +11,24 @@ from jaxtyping import Float
 from pydantic import Field, model_validator
 
 from jaxbiped.config import Model
+from jaxbiped.core import checks
+from jaxbiped.core.signatures import checked
+from jaxbiped.errors import InputError
 from jaxbiped.sensing.camera import CameraConfig
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 Baseline = Annotated[float, Field(ge=0.001, le=2.0)]  # [m]; beyond, the file is in other units
+LEAST = 1e-9  # of what must be above 0
 DISTORTIONS = (0, 4, 5, 8, 12, 14)  # coefficients that OpenCV knows
 
 
 @dataclass(frozen=True)
 class StereoCamera:
-    """A rectified pair. Pixel (0, 0) has its centre at (0, 0). Camera frame: x right, y down, z ahead, left camera."""
+    """A rectified pair. Pixel (0, 0) has its centre at (0, 0). Camera frame: x right, y down, z ahead, left camera.
+
+    Raises:
+      InputError: a number that is not finite, no focal length or baseline above 0, or a size that is none.
+    """
 
     focal: float  # [px]
     centre: tuple[float, float]  # [px] principal point (u, v) of the left image
@@ -28,7 +36,17 @@ class StereoCamera:
     size: tuple[int, int]  # [px] (width, height)
     doffs: float = 0.0  # [px] column of the right principal point less that of the left; 0 for parallel cameras
 
+    def __post_init__(self):
+        for name, least in (("focal", LEAST), ("baseline", LEAST), ("centre", -np.inf), ("doffs", -np.inf)):
+            checks.finite(name, getattr(self, name), least)
+        for name in ("centre", "size"):
+            if len(np.shape(getattr(self, name))) != 1 or len(getattr(self, name)) != 2:
+                raise InputError("must be two numbers", field=name, value=getattr(self, name))
+        for pixels in self.size:
+            checks.whole_number("size", pixels, 1)
 
+
+@checked()
 def ideal(camera: CameraConfig) -> StereoCamera:
     """The perfect camera of a camera file of the robot, as it is rendered."""
     return StereoCamera(camera.focal, camera.image.centre, camera.baseline, (camera.width, camera.height))

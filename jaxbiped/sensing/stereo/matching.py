@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
+from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.sensing.stereo.semi_global import STEPS, MatchParams, agreement, search
 from jaxbiped.sensing.stereo.slanted import search_slanted
@@ -23,6 +24,7 @@ class Disparity:
     valid: Bool[np.ndarray, "H W"]  # measured
 
 
+@checked()
 def match(left: np.ndarray, right: np.ndarray, params: MatchParams | None = None) -> Disparity:
     """Disparity of a rectified pair of 8-bit images, grey [H, W] or RGB [H, W, 3].
 
@@ -34,7 +36,7 @@ def match(left: np.ndarray, right: np.ndarray, params: MatchParams | None = None
     lost. (Paper, 2.1; how it matches is not said there.)
 
     Raises:
-      InputError: images of different size, or of another type.
+      InputError: images of different size, of another type, or too wide for 32-bit numbers.
     """
     params = params or MatchParams()
     left, right = grey(left, "left"), grey(right, "right")
@@ -61,6 +63,8 @@ def match(left: np.ndarray, right: np.ndarray, params: MatchParams | None = None
 
 def grey(image: np.ndarray, field: str = "image") -> UInt8[np.ndarray, "H W"]:
     """An 8-bit image, grey or RGB, as grey; raise `InputError` about anything else."""
+    if not isinstance(image, np.ndarray):
+        raise InputError("must be a NumPy array, 8 bits, [H, W] or [H, W, 3]", field=field, value=type(image).__name__)
     if image.dtype != np.uint8 or image.ndim not in (2, 3) or image.shape[2:] not in ((), (3,)) or image.size == 0:
         got = f"{image.dtype} {list(image.shape)}"
         raise InputError("must be an 8-bit image [H, W] or [H, W, 3]", field=field, value=got)

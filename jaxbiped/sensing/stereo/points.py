@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float32
 
+from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.sensing.stereo.calibration import StereoCamera
 from jaxbiped.sensing.stereo.matching import Disparity
@@ -25,13 +26,14 @@ class Points(NamedTuple):
     weight: Float32[np.ndarray, "N"]  # pixels: 1, or 0 where nothing was measured; such points lie at the origin
 
 
+@checked()
 def to_points(disparity: Disparity, camera: StereoCamera) -> Points:
     """Points of a disparity image: z = focal * baseline / (d + doffs), x = (u - cu) z / focal, y = (v - cv) z / focal.
 
     N = H W, always. Disparities that are not valid, not finite, or below 1/16 px of parallax have weight 0.
 
     Raises:
-      InputError: the image does not have the camera's size.
+      InputError: the image does not have the camera's size, or arrays of another shape or type.
     """
     height, width = disparity.value.shape
     if (width, height) != tuple(camera.size):

@@ -33,19 +33,19 @@ class MatchParams(Model):
     """[px] least disparity; below 0 for cameras that squint (`doffs`)."""
     block_size: int = Field(3, ge=1, le=11)
     """[px] side of a block; odd."""
-    p1: int = Field(30, ge=0)
+    p1: int = Field(30, ge=0, le=8191)
     """Price of a change of disparity by 1 px to the next pixel."""
-    p2: int = Field(250, ge=1)
-    """Price of a greater change; above p1."""
+    p2: int = Field(250, ge=1, le=8192)
+    """Price of a greater change; above p1. (OpenCV sums prices in 16 bits.)"""
     pre_filter_cap: int = Field(63, ge=1, le=63)
     """Gradients beyond this are cut."""
     uniqueness: int = Field(5, ge=0, le=99)
     """[%] by which the best match must beat the next."""
-    speckle_size: int = Field(200, ge=0)
+    speckle_size: int = Field(200, ge=0, le=2**30)
     """[px] patches of no more pixels are dropped; 0 for none."""
-    speckle_range: int = Field(2, ge=1)
+    speckle_range: int = Field(2, ge=1, le=2048)
     """[px] by which disparity may change within a patch."""
-    left_right: int = Field(1, ge=-1)
+    left_right: int = Field(1, ge=-1, le=2048)
     """[px] by which left and right disparities may differ; -1 for no check."""
     agreement: float = Field(0.35, ge=-1, lt=1)
     """Least correlation of the two images' gradients about a matched pixel; -1 for no check. What both images share is
