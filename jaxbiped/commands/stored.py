@@ -14,7 +14,7 @@ from rich.console import Console
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.report.answer import answer
 from jaxbiped.report.grid import to_grid
 from jaxbiped.report.page import PAGE, Section, page_of, render
@@ -83,6 +83,8 @@ def main(args: StoredArgs) -> int:
     comparison, frame = compare_sides(*sides, resamples=args.resamples, level=args.level)
     tests, planned = tested(args, frame, comparison), foreseen(args, frame, comparison)
     sentences = (*left_out(sides, frame), *answer(comparison))
+    if args.out:
+        write(args.out, sides, comparison, frame, tests, (sentences, planned))
     console = Console()
     for sheet in (*terminal_sheets(comparison), *tests):
         if sheet.groups:
@@ -90,7 +92,6 @@ def main(args: StoredArgs) -> int:
     for sentence in (*sentences, *planned):
         console.print(sentence, highlight=False)
     if args.out:
-        write(args.out, sides, comparison, frame, tests, (sentences, planned))
         console.print(f"written {args.out}: comparison.md, {PAGE}", highlight=False)
     return 0
 
@@ -158,4 +159,4 @@ def write(
     texts = {"comparison.md": "\n".join(lines), PAGE: render(page)}
     with new_folder(out) as folder:
         for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            write_whole(folder / name, lambda file, text=text: file.write(text.encode()))
