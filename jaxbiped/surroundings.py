@@ -29,6 +29,7 @@ READ = (*PREFIXES, "XLA_", "MUJOCO_", "PYOPENGL_", "MPL", "MATPLOTLIB", "POLARS_
 OF_DEVICES = ("JAX_PLATFORMS", "JAX_PLATFORM_NAME", "JAX_NUM_CPU_DEVICES", "JAX_DEFAULT_DEVICE")
 PARSE_FLAGS = "from jaxlib import xla_client; xla_client.CompileOptions()"  # XLA ends a process whose flags are wrong
 FLAGS_TIME = 60.0  # [s] for that
+LOGGED = re.compile(r"^[EF]\d{4} \S+ +\d+ \S+\] (.*?)\.?$", re.MULTILINE)  # an error, as XLA logs it
 
 
 def settle() -> None:
@@ -65,9 +66,8 @@ def check_flags(flags: str) -> None:
         run = subprocess.run(command, check=False, capture_output=True, text=True, timeout=FLAGS_TIME)
     except (OSError, subprocess.SubprocessError):
         return  # then XLA has to say it
-    if run.returncode < 0:  # ended by a signal
-        said = next((line for line in run.stderr.splitlines() if "XLA_FLAGS" in line), "")
-        raise InputError(said.partition("] ")[2].lower() or "not accepted by XLA", field="XLA_FLAGS", value=flags)
+    if run.returncode and (said := LOGGED.search(run.stderr)):
+        raise InputError(f"cannot be used: {said[1]}", field="XLA_FLAGS", value=flags)
 
 
 def check_devices() -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import codecs
 import contextlib
 import os
+import shlex
 import shutil
 import signal
 import sys
@@ -137,6 +138,11 @@ def keep_descriptors() -> None:
             os.fstat(descriptor)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # takes the lowest one that is free
+
+
+def command_line() -> str:
+    """That of this process, for people to repeat; bytes of file names that are no text become question marks."""
+    return shlex.join(["jaxbiped", *sys.argv[1:]]).encode("utf-8", "replace").decode()
 
 
 class Terminated(KeyboardInterrupt):

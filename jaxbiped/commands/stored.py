@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -26,6 +24,7 @@ from jaxbiped.study.config import StrategyName
 from jaxbiped.study.equivalence import equivalences
 from jaxbiped.study.pilot import plan
 from jaxbiped.study.sides import Side, choose, compare_sides, open_stored
+from jaxbiped.terminal import command_line
 
 Share = Annotated[float, pydantic.Field(gt=0.0, lt=1.0)]
 Amount = Annotated[float, pydantic.Field(gt=0.0)]
@@ -137,7 +136,7 @@ def write(
     """A folder with `comparison.md` and a page."""
     title, (said, planned) = question(comparison), sentences
     manifests = {side.stored.folder: side.stored.manifest for side in sides}
-    commands = (*(manifest.command for manifest in manifests.values()), shlex.join(["jaxbiped", *sys.argv[1:]]))
+    commands = (*(manifest.command for manifest in manifests.values()), command_line())
     lines = [f"# {title}", "", *(f"- {sentence}" for sentence in (*said, *planned)), ""]
     lines += [to_markdown(sheet) for sheet in (*written_sheets(comparison), *tests)]
     lines += ["## How it was made", "", *(f"    {command}" for command in commands), ""]
