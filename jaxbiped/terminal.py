@@ -17,7 +17,7 @@ import sys
 import threading
 import unicodedata
 from collections.abc import Iterator
-from typing import Any, TextIO
+from typing import Any
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
@@ -50,7 +50,7 @@ codecs.register_error(PLAIN, plain)
 class Sink:
     """A text stream whose `write` and `flush` never fail: from the first error on, it swallows what it is given."""
 
-    def __init__(self, stream: TextIO):
+    def __init__(self, stream: Any):
         self.stream = stream
         self.error: OSError | ValueError | None = None  # the first; of a closed file it is a ValueError
 
@@ -89,7 +89,7 @@ class Sink:
         return None
 
 
-def silence(stream: TextIO) -> None:
+def silence(stream: Any) -> None:
     """Let what a stream still holds, and whatever comes, go nowhere, so that Python can close it without an error."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
