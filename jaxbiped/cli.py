@@ -91,9 +91,9 @@ def answer(argv: list[str]) -> int:
         return 0
     if argv[0] not in COMMANDS:
         raise InputError(f"must be one of {', '.join(COMMANDS)}", field="command", value=argv[0])
-    surroundings.settle()
     try:
-        return dispatch(argv[0], argv[1:])
+        with surroundings.settled():
+            return dispatch(argv[0], argv[1:])
     except InputError:
         raise
     except Exception as error:  # of a library: perhaps about what the shell told it

@@ -6,11 +6,13 @@ Numba compute are overridden: rows are the same in every shell. What cannot be u
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import subprocess
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 from jaxbiped.errors import InputError
@@ -32,22 +34,33 @@ FLAGS_TIME = 60.0  # [s] for that
 LOGGED = re.compile(r"^[EF]\d{4} \S+ +\d+ \S+\] (.*?)\.?$", re.MULTILINE)  # an error, as XLA logs it
 
 
-def settle() -> None:
-    """Override what would change our results or fail; to be called before JAX, Numba and matplotlib are imported.
+# Set, not removed: of Numba a .numba_config.yaml of the working folder counts for what is not set.
+SET = {"NUMBA_DISABLE_JIT": "0", "MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
+
+
+@contextlib.contextmanager
+def settled() -> Iterator[None]:
+    """Override what would change our results or fail, in a block in which JAX, Numba and matplotlib are imported.
 
     Raises:
       InputError: XLA would end this process for its flags, or a matplotlibrc of this folder is no text.
     """
-    for name in [name for name in os.environ if name.startswith(PREFIXES) and not RESPECTED.fullmatch(name)]:
-        del os.environ[name]
-    os.environ["NUMBA_DISABLE_JIT"] = "0"  # set, as a .numba_config.yaml of this folder counts for what is not
-    os.environ |= {"MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
-    if os.environ.get("PYTHONWARNINGS"):
-        warnings.resetwarnings()  # "error" would make an error of what any library warns of
-        warnings.simplefilter("default")
-    check_matplotlibrc(Path("matplotlibrc"))
-    if os.environ.get("XLA_FLAGS") and "jax" not in sys.modules:
-        check_flags(os.environ["XLA_FLAGS"])
+    foreign = {name for name in os.environ if name.startswith(PREFIXES) and not RESPECTED.fullmatch(name)}
+    before = {name: os.environ.pop(name, None) for name in foreign | SET.keys()}
+    os.environ.update(SET)
+    try:
+        with warnings.catch_warnings():
+            if os.environ.get("PYTHONWARNINGS"):
+                warnings.resetwarnings()  # "error" would make an error of what any library warns of
+                warnings.simplefilter("default")
+            check_matplotlibrc(Path("matplotlibrc"))
+            if os.environ.get("XLA_FLAGS") and "jax" not in sys.modules:
+                check_flags(os.environ["XLA_FLAGS"])
+            yield
+    finally:
+        for name in SET:
+            os.environ.pop(name, None)
+        os.environ.update({name: value for name, value in before.items() if value is not None})
 
 
 def check_matplotlibrc(file: Path) -> None:

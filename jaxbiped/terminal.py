@@ -106,10 +106,9 @@ def lasting_streams() -> Iterator[Sink]:
       That of standard output, flushed and told of its errors when the block ends.
     """
     keep_descriptors()
-    if shutil.get_terminal_size().columns < NARROWEST:
-        os.environ["COLUMNS"] = str(NARROWEST)
     before, sinks, errors = (sys.stdout, sys.stderr), [], []
     with contextlib.ExitStack() as stack:
+        stack.enter_context(wide_enough())
         for stream in before:
             stream = stream or stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
             errors.append(getattr(stream, "errors", None))
@@ -129,6 +128,21 @@ def lasting_streams() -> Iterator[Sink]:
                 if handler and hasattr(stream, "reconfigure"):
                     with contextlib.suppress(ValueError):
                         stream.reconfigure(errors=handler)
+
+
+@contextlib.contextmanager
+def wide_enough() -> Iterator[None]:
+    """Let a terminal count as at least `NARROWEST` wide."""
+    asked = os.environ.get("COLUMNS")
+    if shutil.get_terminal_size().columns >= NARROWEST:
+        yield
+        return
+    os.environ["COLUMNS"] = str(NARROWEST)
+    try:
+        yield
+    finally:
+        del os.environ["COLUMNS"]
+        os.environ |= {} if asked is None else {"COLUMNS": asked}
 
 
 def keep_descriptors() -> None:
