@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
+from skimage import data
 
 from jaxbiped.commands import compare, fit_sensor, plan, reproduce, run, scenario, sweep
 from jaxbiped.commands.plan import Plan
@@ -20,6 +22,7 @@ from jaxbiped.study.reproduction.findings import Findings
 from jaxbiped.study.reproduction.mishaps import MISHAPS, Ending
 from jaxbiped.study.store import read_manifest
 from tests.commands.test_classify import ROOM
+from tests.commands.test_stereo import CAMERA
 from tests.report.test_pictures import mission
 from tests.report.test_reproduction_page import a_log, a_record
 from tests.study.test_sides import stored
@@ -80,6 +83,11 @@ def a_cloud(here, monkeypatch):
     np.savez(here / "cloud.npz", points=ROOM)
 
 
+def a_pair(here, monkeypatch):
+    for name, image in zip(("left", "right"), data.stereo_motorcycle(), strict=False):
+        Image.fromarray(image).save(here / f"{name}.png")
+
+
 def a_fit(here, monkeypatch):
     class Eyes:
         def __init__(self, camera: CameraConfig):
@@ -131,16 +139,22 @@ CASES = {
         ("run", SCENE, *OUT), with_configs(a_mission), "reached: 30 cm", ("out/mission.json", "out/mission.npz")
     ),
     "compare": Case(("compare", *OUT), a_study(compare, 1), "Strategies on", ("out/rows", "out/report.html")),
-    "stored": Case(("compare", "r", *FEW, *OUT), results(1), "full - ", ("out/comparison.md", "out/report.html")),
+    "stored": Case(("compare", "r", *FEW, *OUT), results(1), "Strategies on", ("out/comparison.md", "out/report.html")),
     "points": Case(
         ("compare", "r", "--first-point", "2", "--second-point", "0", *FEW, *OUT),
-        results(3), "full", ("out/comparison.md", "out/report.html"),
+        results(3), "Strategies on", ("out/comparison.md", "out/report.html"),
     ),
-    "sweep": Case(("sweep", "sweep.toml", *OUT), a_study(sweep, 3), "c3", ("out/rows", "out/report.html")),
+    "sweep": Case(("sweep", "sweep.toml", *OUT), a_study(sweep, 3), "Success at each", ("out/rows", "out/report.html")),
     "report": Case(("report", "r", "--examples", "0"), results(1), "Strategies on", ("r/report.html", "r/summary.md")),
-    "report of a sweep": Case(("report", "r", "--examples", "0"), results(3), "c3", ("r/report.html", "r/sweep.png")),
+    "report of a sweep": Case(
+        ("report", "r", "--examples", "0"), results(3), "Success at each", ("r/report.html", "r/sweep.png")
+    ),
     "tune": Case(("tune", "--from-durations", "table", *OUT), nothing, "Costs from", ("out/costs.toml",)),
     "classify": Case(("classify", "cloud.npz", *OUT), a_cloud, "cloud ", ("out/classes.npz", "out/classify.json")),
+    "stereo": Case(
+        ("stereo", "left.png", "right.png", "--camera", str(CAMERA), "--pitch", "0.1", "--max-range", "4", *OUT),
+        a_pair, "pair ", ("out/classes.npz", "out/stereo.json"),
+    ),
     "primitives": Case(
         ("primitives", "--pace", "fast", "--only", "stand", "--draws", "1", "--no-videos", *OUT),
         nothing, "Success", ("out/library.toml", "out/summary.md"),
