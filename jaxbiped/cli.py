@@ -6,7 +6,6 @@ import contextlib
 import importlib
 import io
 import itertools
-import os
 import re
 import sys
 from collections.abc import Sequence
@@ -15,9 +14,10 @@ from typing import Any, get_args
 
 import pydantic
 
-from jaxbiped import __version__
+from jaxbiped import __version__, surroundings
 from jaxbiped.config import Model, input_error, load_toml, parse
 from jaxbiped.errors import InputError
+from jaxbiped.terminal import Sink, Terminated, ended_by_signals, lasting_streams
 
 # command: (module, options, one line, whether a TOML file may come first and give the defaults)
 COMMANDS = {
@@ -44,34 +44,69 @@ WRONG_INPUT = 2  # exit status
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; the entry point of the package.
 
+    Whatever becomes of the terminal, a command runs to its end: see `jaxbiped.terminal`.
+
     Returns:
-      The exit status: 0, 1 for a result that is a failure, 2 for input that cannot be used (one line on stderr), 130
-      when interrupted.
+      The exit status: 0, 1 for a result that is a failure, 2 for input that cannot be used and output that cannot be
+      written (one line on stderr), 130 when interrupted, 143 when terminated.
     """
     argv = list(sys.argv[1:] if argv is None else argv)
+    with lasting_streams() as output:
+        try:
+            with ended_by_signals():
+                status = answer(argv)
+            return settled(status, output)
+        except InputError as error:
+            return refuse(error)
+        except Terminated as signal:
+            print(f"jaxbiped: {signal}", file=sys.stderr)
+            return signal.status
+        except KeyboardInterrupt:
+            print("jaxbiped: interrupted", file=sys.stderr)
+            return 130
+        except SystemExit as stop:  # of --help
+            if settled(0, output):
+                return WRONG_INPUT
+            raise stop
+
+
+def refuse(error: InputError) -> int:
+    """Print the one line, and return the exit status."""
+    print(f"jaxbiped: {error}", file=sys.stderr)
+    return WRONG_INPUT
+
+
+def settled(status: int, output: Sink) -> int:
+    """The exit status of a command that ended with `status`, once all that it printed is written, or is not."""
+    output.flush()
+    problem = output.problem()
+    return refuse(problem) if problem else status
+
+
+def answer(argv: list[str]) -> int:
+    """What the command line asks for: a command's exit status, or the program's own help."""
     if not argv or argv[0] in ("-h", "--help"):
         print(usage())
         return 0 if argv else WRONG_INPUT
     if argv[0] == "--version":
         print(f"jaxbiped {__version__}")
         return 0
+    if argv[0] not in COMMANDS:
+        raise InputError(f"must be one of {', '.join(COMMANDS)}", field="command", value=argv[0])
     try:
-        return dispatch(argv[0], argv[1:])
-    except InputError as error:
-        print(f"jaxbiped: {error}", file=sys.stderr)
-        return WRONG_INPUT
-    except KeyboardInterrupt:
-        print("jaxbiped: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        with surroundings.settled():
+            return dispatch(argv[0], argv[1:])
+    except InputError:
+        raise
+    except Exception as error:  # of a library: perhaps about what the shell told it
+        found = surroundings.culprit(error)
+        if found is None:
+            raise
+        raise found from None
 
 
 def dispatch(name: str, rest: list[str]) -> int:
     """Parse the options of a command, and run it."""
-    if name not in COMMANDS:
-        raise InputError(f"must be one of {', '.join(COMMANDS)}", field="command", value=name)
     import tyro
 
     module_name, options_name, _, takes_file = COMMANDS[name]
@@ -98,6 +133,7 @@ def dispatch(name: str, rest: list[str]) -> int:
         if not stop.code:
             raise
         raise one_line(said.getvalue()) from None
+    surroundings.check_devices()
     return module.main(args)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache, partial
 
@@ -12,6 +13,11 @@ from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
 AXIS = "device"
 EACH, ALL = PartitionSpec(AXIS), PartitionSpec()  # a row or rows of the leading axis for each device; the same for all
+
+
+def cores() -> int:
+    """Cores that this process may use: those of its affinity, where the system has one (macOS has none)."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def mesh_of(devices: Sequence[jax.Device]) -> Mesh:

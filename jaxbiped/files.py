@@ -1,9 +1,16 @@
-"""Files that are either whole or not there, written beside their place, then moved into it; texts and YAML, read."""
+"""Files that are either whole or not there: written beside their place, then moved into it. Texts and YAML, read.
+
+What is being written is hidden, ends in `.part`, and is locked by its writer for as long as that lives. What a killed
+writer left is therefore known by its lock being free, and swept up by the next writer into the same place.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import glob
 import os
+import secrets
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,29 +20,31 @@ import yaml
 
 from jaxbiped.errors import InputError
 
+TRIES = 10  # to make a temporary file before anybody takes it for a dead writer's
 
-def write_whole(path: str | Path, write: Callable[[BinaryIO], object]) -> None:
+
+def write_whole(path: str | Path, write: Callable[[BinaryIO], object], *, parents: bool = False) -> None:
     """Create or replace the file `path` with what `write(file)` writes, all of it or nothing.
 
     Args:
-      path: where the file shall be; its folder must exist.
+      path: where the file shall be; its folder must exist, or is made with `parents`.
       write: is given a binary file that is open for reading and writing.
 
     Raises:
       InputError: the folder does not exist, is not writable, or the disk is full; nothing is left behind.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with open(temporary, "w+b") as file:
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(temporary, path)
+        if parents:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        with part(path, lambda temporary: temporary.touch(exist_ok=False)) as temporary:
+            with open(temporary, "w+b") as file:
+                write(file)
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(temporary, path)
     except OSError as error:
         raise InputError(f"cannot be written: {reason(error)}", file=path) from None
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -54,16 +63,63 @@ def new_folder(path: str | Path, field: str = "out") -> Iterator[Path]:
     """
     path = Path(path)
     refuse_existing(path, field)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        temporary.mkdir(parents=True)
-        yield temporary
-        refuse_existing(path, field)
-        os.rename(temporary, path)
+        with part(path, lambda temporary: temporary.mkdir(parents=True)) as temporary:
+            yield temporary
+            refuse_existing(path, field)
+            os.rename(temporary, path)
     except OSError as error:
         raise InputError(f"cannot be written: {reason(error)}", file=path, field=field) from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def part(path: Path, make: Callable[[Path], object]) -> Iterator[Path]:
+    """What is to become `path`: made by `make` beside it, locked, and gone when the block ends, unless it was moved."""
+    sweep_up(path.parent, path.name)
+    for _ in range(TRIES):
+        temporary = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
+        try:
+            make(temporary)
+            descriptor = os.open(temporary, os.O_RDONLY)
+        except FileNotFoundError:
+            if not path.parent.is_dir():
+                raise
+            continue  # swept up between being made and being locked
+        try:
+            with contextlib.suppress(OSError):  # a file system without locks: then nobody sweeps up there, either
+                fcntl.flock(descriptor, fcntl.LOCK_EX)
+            if os.path.lexists(temporary):
+                yield temporary
+                return
+        finally:
+            remove(temporary)
+            os.close(descriptor)
+    raise FileExistsError(f"{path} is swept up by another process all the time")
+
+
+def sweep_up(folder: Path, name: str | None = None) -> None:
+    """Remove what killed writers were writing into a folder; what a living one writes is locked, and left alone.
+
+    Args:
+      name: of the file or folder that was being written; by default any.
+    """
+    for scrap in folder.glob(f".{glob.escape(name) if name else '*'}.*.part"):
+        with contextlib.suppress(OSError):
+            descriptor = os.open(scrap, os.O_RDONLY | os.O_NONBLOCK)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                remove(scrap)
+            finally:
+                os.close(descriptor)
+
+
+def remove(path: Path) -> None:
+    """A file, or a folder with what is in it, as far as that can be removed."""
+    if path.is_dir():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
 
 
 def refuse_existing(path: str | Path, field: str = "out") -> None:

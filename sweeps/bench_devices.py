@@ -106,6 +106,8 @@ def main() -> None:
     args = parser.parse_args()
     if args.child:
         return child(args.child, args.cores)
+    if not hasattr(os, "sched_setaffinity"):
+        sys.exit("this needs a system that pins processes to cores, such as Linux")
     cores = sorted(os.sched_getaffinity(0))[:2]
     if len(cores) < 2:
         sys.exit("this needs two cores")

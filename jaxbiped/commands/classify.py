@@ -58,11 +58,6 @@ def main(args: ClassifyArgs) -> int:
     made = chart(upright.apply(cloud.points), args, (float(away[0]), float(away[1])), sparse=True)
     seconds = time.perf_counter() - start
 
-    print(f"cloud     {args.cloud}: {len(cloud.points)} points{dropped(cloud)}")
-    if cloud.origin.any():
-        print(f"origin    far from 0: computed from {', '.join(f'{v:.0f}' for v in cloud.origin)} m")
-    print(f"floor     {say_floor(upright, cloud)}")
-    print(f"map       {say_map(made)}, in {seconds:.1f} s")
     T = np.eye(4)
     T[:3, :3] = upright.R
     T[:3, 3] = upright.shift - upright.R @ cloud.origin + np.array([away[0], away[1], 0])
@@ -77,6 +72,11 @@ def main(args: ClassifyArgs) -> int:
             "T_map_cloud": T.tolist(),
         }
         write_json(folder / "classify.json", summary)
+    print(f"cloud     {args.cloud}: {len(cloud.points)} points{dropped(cloud)}")
+    if cloud.origin.any():
+        print(f"origin    far from 0: computed from {', '.join(f'{v:.0f}' for v in cloud.origin)} m")
+    print(f"floor     {say_floor(upright, cloud)}")
+    print(f"map       {say_map(made)}, in {seconds:.1f} s")
     print(f"written   {out}: {', '.join([*names, 'classify.json'])}")
     return 0
 

@@ -13,7 +13,6 @@ from jaxbiped.commands.engine import EngineArgs, engine
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
-from jaxbiped.files import refuse_existing
 from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.mission.settings import SIMULATED, program
 from jaxbiped.report.summary import write_report
@@ -22,6 +21,7 @@ from jaxbiped.study.comparison import default_pairs
 from jaxbiped.study.conduct import conduct, never
 from jaxbiped.study.config import StrategyName, StudyConfig
 from jaxbiped.study.groups import shards
+from jaxbiped.study.resume import refuse_taken
 from jaxbiped.study.sequential import MEASURES, Goal
 from jaxbiped.study.stopping import Rule
 
@@ -66,7 +66,7 @@ def main(args: CompareArgs) -> int:
     try_eyes(config.mission)
     out = args.out or Path("results") / f"compare-{config_hash(config)}"
     if not args.resume:
-        refuse_existing(out)
+        refuse_taken(out)
     console = Console()
     names = ", ".join(config.strategies)
     console.print(

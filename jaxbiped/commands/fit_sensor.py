@@ -25,7 +25,7 @@ from jaxbiped.study.sensors import Place, agreement, fused, looking, mission, sa
 
 class FitSensorArgs(Model):
     """Render arenas, watch the matcher and the landmarks, fit the noise of the ray-cast sensor to what is seen, and
-    print how close the two sensors come on other arenas. The file that is written goes with --preset."""
+    say how close the two sensors come on other arenas. The file that is written goes with --preset."""
 
     camera: Path | None = None
     """A camera file (TOML); default: the paper's camera."""
@@ -60,16 +60,22 @@ def main(args: FitSensorArgs) -> int:
               f"baseline {100 * camera.baseline:g} cm, {camera.image_noise:g} grey levels of noise")  # fmt: skip
         found = fit(places, eyes, rendered)
         said = sentences(found, args)
+        store(out, found, args, said)
         print("\n".join(said))
-        out.parent.mkdir(parents=True, exist_ok=True)
-        heading = [f"Written by `jaxbiped fit-sensor --arenas {args.arenas} --views {args.views} --seed {args.seed}`.",
-                   *said, "Fitted: what pictures tell. The rest is the base's: the attitude's error, say."]  # fmt: skip
-        text = sensor_toml(found, heading)
-        write_whole(out, lambda file: file.write(text.encode()))
         others = list(worlds(args.seed, args.arenas, args.arenas, args.views, rendered))
-        compare(others, eyes, rendered, found, args.missions)
+        more = compared(others, eyes, rendered, found, args.missions)
+        store(out, found, args, [*said, *more])
+        print("\n".join(more))
     print(f"written    {out}")
     return 0
+
+
+def store(out: Path, found: Fit, args: FitSensorArgs, said: list[str]) -> None:
+    """Write the sensor file, with what is said of it; once without the comparison, which takes as long as the fit."""
+    heading = [f"Written by `jaxbiped fit-sensor --arenas {args.arenas} --views {args.views} --seed {args.seed}`.",
+               *said, "Fitted: what pictures tell. The rest is the base's: the attitude's error, say."]  # fmt: skip
+    text = sensor_toml(found, heading)
+    write_whole(out, lambda file: file.write(text.encode()), parents=True)
 
 
 def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
@@ -91,8 +97,8 @@ def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
     ]
 
 
-def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, found: Fit, missions: int) -> None:
-    """Print how close both sensors come on arenas that were not fitted to: with the fitted noise, and as it was."""
+def compared(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, found: Fit, missions: int) -> list[str]:
+    """How close both sensors come on arenas that were not fitted to, with the fitted noise and as it was."""
     rendered = rendered.model_copy(update={"stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})
     fitted = with_rays(rendered, found.sensor.rays)
     before = fitted.model_copy(update={"stereo": NoiseConfig()})
@@ -106,23 +112,24 @@ def compare(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, foun
             maps[name].append(fused(place, looking(how, sees), how)[0])
     stereo = np.stack(maps["stereo"])
     count = len(places) * len(places[0].poses)
-    print(f"maps       {len(places)} other arenas, {count} views; cells that are those of stereo:")
+    said = [f"maps       {len(places)} other arenas, {count} views; cells that are those of stereo:"]
     for name in list(each)[1:]:
         how = each[name][0].camera
         share, measured = agreement(stereo, np.stack(maps[name]))
         noise = "the preset `rendered`" if name == "before" else "the fitted noise"
-        print(f"           {share:.1%} with {noise} and {how.columns} x {how.rows} rays, "
-              f"{measured:.1%} of what both measured")  # fmt: skip
+        said.append(f"           {share:.1%} with {noise} and {how.columns} x {how.rows} rays, "
+                    f"{measured:.1%} of what both measured")  # fmt: skip
     for name in ("stereo", "fitted"):
         rated = score(maps[name], [place.classes for place in places])
         kinds = ", ".join(f"{kind} {rated.recall[kind]:.3f} / {rated.precision[kind]:.3f}" for kind in rated.recall)
-        print(f"{name:<10} right {rated.right:.3f}; recall / precision within one cell: {kinds}")
+        said.append(f"{name:<10} right {rated.right:.3f}; recall / precision within one cell: {kinds}")
     if missions:
         pairs = [(mission(place, rendered, eyes), mission(place, fitted, None)) for place in
                  track(places[:missions], description="missions", console=show, transient=True)]  # fmt: skip
         alike = sum(same(*pair) for pair in pairs)
-        print(f"missions   {alike} of {len(pairs)} ended alike (code, and distance and time within 10 %)")
+        said.append(f"missions   {alike} of {len(pairs)} ended alike (code, and distance and time within 10 %)")
         for k, pair in enumerate(pairs):
             if not same(*pair):
                 told = " and ".join(f"{o.code.label} {100 * o.distance:.0f} cm {o.time:.0f} s" for o in pair)
-                print(f"           other arena {k}: {told}")
+                said.append(f"           other arena {k}: {told}")
+    return said

@@ -101,9 +101,9 @@ def main(args: PlanArgs) -> int:
     if plan is None:
         print(f"no path from {source.say(start_ij)} to {source.say(goal_ij)} on {args.file}")
         return NO_PATH
-    report(source, plan, args)
     with new_folder(out) as folder:
         write(source, plan, folder, args)
+    report(source, plan, args)
     print(f"written   {out}: path.csv, path.npz, map.png")
     return 0
 

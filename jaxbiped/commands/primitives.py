@@ -6,8 +6,6 @@ import dataclasses
 import io
 import json
 import math
-import shlex
-import sys
 import time
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -36,6 +34,7 @@ from jaxbiped.report.library import library, library_text
 from jaxbiped.report.primitives import markdown, save_windows, terminal
 from jaxbiped.report.video import save_primitive
 from jaxbiped.study import store
+from jaxbiped.terminal import command_line
 
 Name = Literal[tuple(PAPER)]
 MM, DEG = 1e-3, math.radians(1.0)
@@ -124,7 +123,7 @@ def main(args: PrimitivesArgs) -> int:
             f"{name}: {len(frames[-1])} trials, {simulated:.0f} s simulated in {spent:.0f} s", highlight=False
         )
     rows = pl.concat(frames)
-    command = shlex.join(["jaxbiped", *sys.argv[1:]])
+    command = command_line()
     with new_folder(out) as folder:
         manifest = {
             "command": command,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -32,6 +30,7 @@ from jaxbiped.study.reproduction.saved import always, population, study
 from jaxbiped.study.reproduction.staging import load_scenes, seeing
 from jaxbiped.study.reproduction.table_1 import SCENES
 from jaxbiped.study.reproduction.table_2 import NAMES, verify_all
+from jaxbiped.terminal import command_line
 
 
 class ReproduceArgs(Model):
@@ -85,7 +84,7 @@ def main(args: ReproduceArgs) -> int:
         "Device": jax.devices()[0].platform,
         "Versions": ", ".join(f"{name} {version}" for name, version in store.versions().items()),
     }
-    files = write(out, found, args.model_dump(mode="json"), facts, shlex.join(["jaxbiped", *sys.argv[1:]]))
+    files = write(out, found, args.model_dump(mode="json"), facts, command_line())
     for sentence in answer(found):
         console.print(sentence, highlight=False)
     console.print(f"written {out}: {', '.join(files)}", highlight=False)

@@ -14,7 +14,7 @@ import tyro
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.config import Model, config_hash
-from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.eyes import eyes_for
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recording import FILE, save_log
@@ -73,14 +73,14 @@ def main(args: RunArgs) -> int:
         on_decision=lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
         eyes=eyes,
     )
-    print(sentence(mission))
     with new_folder(out) as folder:
         title = f"{name}, {args.strategy}: {sentence(mission)}"
         save_mission(folder / "map.png", mission.log, title=title)
         save_gif(folder / "mission.gif", mission.log, title=f"{name}, {args.strategy}")
         facts = summary(args, name, mission)
-        (folder / "mission.json").write_text(json.dumps(facts, indent=2) + "\n")
+        write_whole(folder / "mission.json", lambda file: file.write((json.dumps(facts, indent=2) + "\n").encode()))
         save_log(folder / FILE, mission.log, facts)
+    print(sentence(mission))
     print(f"written {out}: map.png, mission.gif, mission.json, {FILE}")
     return 0 if mission.code == Code.REACHED else NOT_REACHED
 

@@ -65,7 +65,7 @@ def lengths(
 
 
 def check_scenario(source: MapSource, path: Path, sample: int | None, out: Path) -> int:
-    """Compare each query with the planner, print how many agree, and write all of them to `out`/queries.csv.
+    """Compare each query with the planner, write all of them to `out`/queries.csv, and print how many agree.
 
     Args:
       source: the map.
@@ -94,6 +94,12 @@ def check_scenario(source: MapSource, path: Path, sample: int | None, out: Path)
         [int(b), int(s[1]), int(s[0]), int(g[1]), int(g[0]), float(o), f"{f:.9g}", bool(e)]
         for b, s, g, o, f, e in zip(scenario.bucket[picked], start, goal, optimal, found, equal, strict=True)
     ]
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(["bucket", "start_x", "start_y", "goal_x", "goal_y", "optimal", "found", "equal"])
+    table.writerows(rows)
+    with new_folder(out) as folder:
+        write_whole(folder / "queries.csv", lambda file: file.write(text.getvalue().encode()))
     print(f"map       {source.file}: {source.grid.shape[1]} x {source.grid.shape[0]} cells")
     print(f"scenario  {path}: {len(picked)} of {count} queries, in {seconds:.1f} s with compilation")
     print(f"equal     {int(equal.sum())} of {len(picked)} optimal lengths")
@@ -104,11 +110,5 @@ def check_scenario(source: MapSource, path: Path, sample: int | None, out: Path)
         print(f"differs   bucket {bucket}, ({sx}, {sy}) to ({gx}, {gy}): file {best:.9g}, found {got}{why}")
     if len(wrong) > LISTED:
         print(f"          and {len(wrong) - LISTED} more")
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(["bucket", "start_x", "start_y", "goal_x", "goal_y", "optimal", "found", "equal"])
-    table.writerows(rows)
-    with new_folder(out) as folder:
-        write_whole(folder / "queries.csv", lambda file: file.write(text.getvalue().encode()))
     print(f"written   {out}: queries.csv")
     return DIFFER if wrong else 0

@@ -91,19 +91,6 @@ def main(args: StereoArgs) -> int:
     pitch, roll = math.asin(-up[2]), math.atan2(-up[0], -up[1])
     warn(float(disparity.valid.mean()), roll if floor and rig.pose is None else 0.0)
     nearest = camera.focal * camera.baseline / max(params.min_disparity + params.num_disparities - 1 + camera.doffs, 1)
-    print(f"pair      {args.left}, {args.right}: {camera.size[0]} x {camera.size[1]} px")
-    print(
-        f"camera    {args.camera}: focal length {camera.focal:.6g} px, baseline {camera.baseline:.4g} m; measures from "
-        f"{nearest:.2f} to {reach:.2f} m"
-    )
-    print(f"matched   {disparity.valid.mean():.1%} of the pixels, in {seconds:.2f} s; {len(points)} points in range")
-    print(
-        f"{'floor' if floor else 'pose'}     {' ' * (not floor)}"
-        f"{'found' if floor else 'of the camera file, for no floor was found'}: camera {height:.3f} m high, pitched "
-        f"{math.degrees(pitch):.2f} and rolled {math.degrees(roll):.2f} degrees"
-        + (f"; {floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm" if floor else "")
-    )
-    print(f"map       {say_map(made)}")
     with new_folder(out) as folder:
         from jaxbiped.report import measured  # loads matplotlib
 
@@ -124,6 +111,19 @@ def main(args: StereoArgs) -> int:
                 "height": height,
             },
         )
+    print(f"pair      {args.left}, {args.right}: {camera.size[0]} x {camera.size[1]} px")
+    print(
+        f"camera    {args.camera}: focal length {camera.focal:.6g} px, baseline {camera.baseline:.4g} m; measures from "
+        f"{nearest:.2f} to {reach:.2f} m"
+    )
+    print(f"matched   {disparity.valid.mean():.1%} of the pixels, in {seconds:.2f} s; {len(points)} points in range")
+    print(
+        f"{'floor' if floor else 'pose'}     {' ' * (not floor)}"
+        f"{'found' if floor else 'of the camera file, for no floor was found'}: camera {height:.3f} m high, pitched "
+        f"{math.degrees(pitch):.2f} and rolled {math.degrees(roll):.2f} degrees"
+        + (f"; {floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm" if floor else "")
+    )
+    print(f"map       {say_map(made)}")
     print(f"written   {out}: {', '.join(['points.ply', 'disparity.png', *names, 'stereo.json'])}")
     return 0
 

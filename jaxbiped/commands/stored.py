@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,7 +12,7 @@ from rich.console import Console
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.report.answer import answer
 from jaxbiped.report.grid import to_grid
 from jaxbiped.report.page import PAGE, Section, page_of, render
@@ -26,6 +24,7 @@ from jaxbiped.study.config import StrategyName
 from jaxbiped.study.equivalence import equivalences
 from jaxbiped.study.pilot import plan
 from jaxbiped.study.sides import Side, choose, compare_sides, open_stored
+from jaxbiped.terminal import command_line
 
 Share = Annotated[float, pydantic.Field(gt=0.0, lt=1.0)]
 Amount = Annotated[float, pydantic.Field(gt=0.0)]
@@ -83,6 +82,8 @@ def main(args: StoredArgs) -> int:
     comparison, frame = compare_sides(*sides, resamples=args.resamples, level=args.level)
     tests, planned = tested(args, frame, comparison), foreseen(args, frame, comparison)
     sentences = (*left_out(sides, frame), *answer(comparison))
+    if args.out:
+        write(args.out, sides, comparison, frame, tests, (sentences, planned))
     console = Console()
     for sheet in (*terminal_sheets(comparison), *tests):
         if sheet.groups:
@@ -90,7 +91,6 @@ def main(args: StoredArgs) -> int:
     for sentence in (*sentences, *planned):
         console.print(sentence, highlight=False)
     if args.out:
-        write(args.out, sides, comparison, frame, tests, (sentences, planned))
         console.print(f"written {args.out}: comparison.md, {PAGE}", highlight=False)
     return 0
 
@@ -136,7 +136,7 @@ def write(
     """A folder with `comparison.md` and a page."""
     title, (said, planned) = question(comparison), sentences
     manifests = {side.stored.folder: side.stored.manifest for side in sides}
-    commands = (*(manifest.command for manifest in manifests.values()), shlex.join(["jaxbiped", *sys.argv[1:]]))
+    commands = (*(manifest.command for manifest in manifests.values()), command_line())
     lines = [f"# {title}", "", *(f"- {sentence}" for sentence in (*said, *planned)), ""]
     lines += [to_markdown(sheet) for sheet in (*written_sheets(comparison), *tests)]
     lines += ["## How it was made", "", *(f"    {command}" for command in commands), ""]
@@ -158,4 +158,4 @@ def write(
     texts = {"comparison.md": "\n".join(lines), PAGE: render(page)}
     with new_folder(out) as folder:
         for name, text in texts.items():
-            (folder / name).write_text(text, encoding="utf-8")
+            write_whole(folder / name, lambda file, text=text: file.write(text.encode()))

@@ -72,8 +72,8 @@ def main(args: SweepArgs) -> int:
         manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show, **how)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
     report = write_sweep_report(out)
-    console.print(terminal(report))
     files = (write_sweep_page(report), *report.files)
+    console.print(terminal(report))
     names = ", ".join(["rows", "points.parquet", "manifest.json", *(path.name for path in files)])
     console.print(f"{manifest.rows} missions in {spent}; written {out}: {names}", highlight=False)
     return 0

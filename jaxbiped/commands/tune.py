@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import shlex
-import sys
 import time
 from functools import partial
 from pathlib import Path
@@ -27,6 +25,7 @@ from jaxbiped.report.tuning import costs_sheet, costs_toml, fits_sheet, gaps_she
 from jaxbiped.study import store
 from jaxbiped.study.durations import Fit, fit, table_2
 from jaxbiped.study.tune import TuneConfig, Tuning, tune
+from jaxbiped.terminal import command_line
 
 
 class TuneArgs(TuneConfig):
@@ -58,7 +57,7 @@ def main(args: TuneArgs) -> int:
     kind = f"-{args.from_durations}" if args.from_durations else ""
     out = args.out or Path("results") / f"tune{kind}-{config_hash(config)}"
     refuse_existing(out)
-    console, command = Console(), shlex.join(["jaxbiped", *sys.argv[1:]])
+    console, command = Console(), command_line()
     if args.from_durations:
         return fitted(config, args.from_durations, out, command, console)
     console.print(f"{missions(config)}", highlight=False)

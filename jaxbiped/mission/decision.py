@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped import mapping, planning
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, wrap_angle
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.fading import Eye
 from jaxbiped.mission.footing import place_feet
@@ -46,6 +47,7 @@ class Thought:
     evidence: Float[Array, "B H W Z"]  # of the 3D grid, with that view
 
 
+@with_own_settings
 def decide(
     mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program
 ) -> tuple[Mind, Command, Int[Array, "B"], Thought]:

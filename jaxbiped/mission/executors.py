@@ -11,6 +11,7 @@ import jax.numpy as jnp
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.boxes import ground_height, plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.execution import CHECKS, ODOMETRY, TOUCH, Execution, Executor
 from jaxbiped.mission.sampled import sampled
 from jaxbiped.mission.settings import Settings
@@ -20,6 +21,7 @@ from jaxbiped.sensing.hashing import fold
 from jaxbiped.sensing.odometry import drift
 
 
+@with_own_settings
 def kinematic(arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
     """Nominal displacement and time (Table 2); odometry drifts from what was walked.
 

@@ -16,6 +16,7 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped import planning
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.movers import only
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Body, Cell, truth_grid
 from jaxbiped.mission.decision import nearest_direction
 from jaxbiped.mission.goal import goal_cell
@@ -33,6 +34,7 @@ class OraclePlan:
     length: Float[Array, "P A"]  # [m] of that path, between cell centres; NaN where it is none or very long
 
 
+@with_own_settings
 @partial(jax.jit, static_argnames=("program",))
 def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePlan:
     """Plans on the true class grid of each arena [A], under each of the settings [P].

@@ -20,6 +20,7 @@ from jaxtyping import Array, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.devices import ALL, EACH, on_each, placed
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
@@ -100,6 +101,7 @@ OnProgress = Callable[[Tally], None]
 Work = Callable[[Arena, Settings, Jobs, OnProgress], Result]
 
 
+@with_own_settings
 def compile_queue(
     arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int = SLOTS, mesh: Mesh | None = None
 ) -> Work:
@@ -130,6 +132,7 @@ def compile_queue(
         COMPILED[signature] = lowered[0].compile(), wide(lowered[1])
     first, further = COMPILED[signature]
 
+    @with_own_settings
     def work(arenas: Arena, settings: Settings, jobs: Jobs, on_progress: OnProgress) -> Result:
         if mesh is not None:
             arenas, settings, jobs = placed(arenas, mesh, ALL), placed(settings, mesh, ALL), placed(jobs, mesh, EACH)

@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridMap, GridSpec, empty
 from jaxbiped.mapping.scan_match import Outlines, no_outlines
 from jaxbiped.mission.outcome import Code
@@ -81,6 +82,7 @@ class Mind:
     outlines: Outlines | None = None  # of walls; only where it localises by these
 
 
+@with_own_settings
 def start(
     arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridSpec, localisation: str = "landmarks"
 ) -> tuple[World, Mind]:

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.eyes import Eyes
@@ -57,6 +58,7 @@ class Mission:
 turn_once = partial(jax.jit, static_argnames=("program",))(cycle)
 
 
+@with_own_settings
 def run_logged(
     arena: Arena,
     settings: Settings,
@@ -74,6 +76,7 @@ def run_logged(
     return recorder.mission(arena, run_bare(arena, settings, seed, program, eyes, recorder))
 
 
+@with_own_settings
 def run_bare(
     arena: Arena,
     settings: Settings,

@@ -21,6 +21,7 @@ from jaxbiped import physics
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridSpec
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.eyes import Eyes
@@ -64,6 +65,7 @@ class Observer(Protocol):
     def moved(self, job: int, qpos: Float[np.ndarray, "nq"], /) -> None: ...
 
 
+@with_own_settings
 def walk(
     arenas: Arena,
     settings: Settings,
@@ -90,6 +92,7 @@ def walk(
     return Walkers(arenas, settings, jobs, program, config, observer, eyes).work(on_progress)
 
 
+@with_own_settings
 def walk_logged(
     arena: Arena,
     settings: Settings,

@@ -37,6 +37,7 @@ from jaxbiped.report.pictures import (
     mark_patch,
     moment,
 )
+from jaxbiped.report.style import own_style
 
 FOOTPRINT = (0.14, 0.16)  # [m] depth and width of the e-nuvo WALK (paper, 3.1)
 FIELD_OF_VIEW = math.radians(97)  # across, of the stereo camera
@@ -148,6 +149,7 @@ class Scene:
         return Image.fromarray(np.asarray(self.canvas.buffer_rgba())[..., :3])
 
 
+@own_style()
 def save_gif(path: str | Path, log: MissionLog, *, title: str = "", dpi: int = 90) -> None:
     """Write a mission as GIF, one frame a moment at 5 frames a second, the last one held for 2 s.
 

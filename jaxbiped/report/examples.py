@@ -14,6 +14,7 @@ from jaxbiped.mission.stepped import Mission
 from jaxbiped.report.page import Section
 from jaxbiped.report.pictures import draw_map, moment
 from jaxbiped.report.plots import WIDTH, Plot
+from jaxbiped.report.style import own_style
 from jaxbiped.study.again import Origin, examples, play_again
 
 KEY = (
@@ -61,6 +62,7 @@ def ending(mission: Mission) -> str:
     return f"{mission.code.label.replace('_', ' ')}, {100 * mission.distance:.0f} cm in {mission.time / 60:.1f} min"
 
 
+@own_style()
 def last_map(mission: Mission) -> Figure:
     """The map that the robot held at the end, the track that it walked, and what was really there."""
     log = mission.log
@@ -77,6 +79,7 @@ def last_map(mission: Mission) -> Figure:
     return figure
 
 
+@own_style()
 def picture(figure: Figure, description: str) -> str:
     """The figure as an `<img>` element that holds its PNG."""
     buffer = io.BytesIO()

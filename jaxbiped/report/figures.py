@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from jaxbiped.files import write_whole
 from jaxbiped.report.answer import MEASURES, SUCCESS, Measure, part, verdict
+from jaxbiped.report.style import own_style
 from jaxbiped.report.words import OPEN
 from jaxbiped.study import ALL, CODES, Comparison, Estimate, Stratum, proportion
 
@@ -40,6 +41,7 @@ BINS = 5  # of difficulty
 DPI = 160
 
 
+@own_style()
 def write_figures(folder: str | Path, frame: pl.DataFrame, comparison: Comparison) -> dict[str, str]:
     """Write the figures that the rows have data for as PNGs into `folder`; file name to caption, in order.
 
@@ -67,9 +69,15 @@ def write_figures(folder: str | Path, frame: pl.DataFrame, comparison: Compariso
 
 def saver(figure: Figure) -> Callable[[object], None]:
     """How to write a figure into an open file; the same figure gives the same bytes."""
-    return lambda file: figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
+
+    @own_style()
+    def save(file: object) -> None:
+        figure.savefig(file, format="png", dpi=DPI, metadata={"Software": None})
+
+    return save
 
 
+@own_style()
 def success(comparison: Comparison) -> Figure:
     """Dots with intervals: families along x, strategies side by side."""
     strata = (ALL, *comparison.strata("family"))
@@ -90,6 +98,7 @@ def success(comparison: Comparison) -> Figure:
     return figure
 
 
+@own_style()
 def codes(comparison: Comparison) -> Figure:
     """Stacked bars: a strategy each, the shares of how its missions ended."""
     names = comparison.strategies
@@ -116,6 +125,7 @@ def codes(comparison: Comparison) -> Figure:
     return figure
 
 
+@own_style()
 def differences(comparison: Comparison, first: str, second: str) -> Figure:
     """A forest plot: success, distance and time, over all arenas and by family."""
     strata = (ALL, *comparison.strata("family"))
@@ -156,6 +166,7 @@ def forest_row(ax: Axes, y: int, value: Estimate, measure: Measure, stratum: Str
     ax.plot(x, y, "D" if stratum == ALL else "o", color=colour, mfc=face, ms=7, mew=1.6)
 
 
+@own_style()
 def times(frame: pl.DataFrame, first: str, second: str, size: tuple[float, float] = (5.6, 5.4)) -> Figure:
     """A dot for each arena that both solved: below the diagonal the first is faster."""
     sides = [frame.filter((pl.col("strategy") == name) & pl.col("success")) for name in (first, second)]
@@ -185,6 +196,7 @@ def times(frame: pl.DataFrame, first: str, second: str, size: tuple[float, float
     return figure
 
 
+@own_style()
 def difficulty(frame: pl.DataFrame, comparison: Comparison, size: tuple[float, float] = (6.4, 4.2)) -> Figure:
     """Success in fifths of the arenas by difficulty, at the fifth's mean difficulty."""
     arenas = frame.unique("arena")["difficulty"].to_numpy()

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.report.pictures import CENTIMETRES, COLOURS, INK, METRES, Axis, draw_map, save_figure
+from jaxbiped.report.style import own_style
 
 LARGEST_IN_CENTIMETRES = 5.0  # [m] a map beyond this is drawn in metres
 MOST_FACES = 60_000  # of voxels that are drawn; beyond, eight voxels become one
@@ -21,6 +22,7 @@ LOOK = np.array([0.62, 0.42, -0.66])  # direction of view of the 3D grid: from b
 SHADES = (1.0, 0.72, 0.55)  # of faces that look up, back and right
 
 
+@own_style()
 def save_disparity(
     path: str | Path, left: np.ndarray, value: Float32[np.ndarray, "H W"], valid: Bool[np.ndarray, "H W"]
 ) -> None:
@@ -51,6 +53,7 @@ def save_voxels(
     save_figure(voxel_figure(occupied, pitch, level_height, lowest, title), path)
 
 
+@own_style()
 def voxel_figure(
     occupied: Bool[np.ndarray, "H W Z"],
     pitch: float,
@@ -142,6 +145,7 @@ def halved(occupied: Bool[np.ndarray, "H W Z"]) -> Bool[np.ndarray, "I J K"]:
     return padded.reshape(h, 2, w, 2, z, 2).any((1, 3, 5))
 
 
+@own_style()
 def save_classes(
     path: str | Path, grid: ClassGrid, title: str = "", camera_xy: tuple[float, float] | None = None
 ) -> None:

@@ -21,6 +21,7 @@ from jaxbiped.files import write_whole
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import Mark, MissionLog, Outline
+from jaxbiped.report.style import own_style
 
 COLOURS = {
     Cell.UNMEASURED: "#ffffff",
@@ -188,11 +189,13 @@ def legend(figure: Figure, *, plan: bool = True, track: bool = False, truth: boo
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False, handlelength=1.6)
 
 
+@own_style()
 def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
     """Write `figure` as PNG, whole or not at all; raise `InputError` when that fails."""
     write_whole(path, lambda file: figure.savefig(file, format="png", dpi=dpi, facecolor="white"))
 
 
+@own_style()
 def save_map(path: str | Path, grid: ClassGrid, *, title: str = "", **what) -> None:
     """A PNG of one map; `what` goes to `draw_map`."""
     rows, columns = grid.shape
@@ -210,6 +213,7 @@ def moment(log: MissionLog, t: int) -> ClassGrid:
     return ClassGrid(log.classes[t], log.levels[t], np.asarray(log.origin_xy, float), log.pitch)
 
 
+@own_style()
 def save_mission(path: str | Path, log: MissionLog, *, title: str = "", panels: int = 4) -> None:
     """A PNG of a mission: the map at up to `panels` moments, evenly spaced, the plan ahead and the track so far."""
     moments = np.unique(np.linspace(0, len(log.time) - 1, panels).round().astype(int)).tolist()

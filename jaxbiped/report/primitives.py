@@ -18,6 +18,7 @@ from jaxbiped.files import write_whole
 from jaxbiped.mission.library import LibraryConfig
 from jaxbiped.motion.gait import PrimitiveTable
 from jaxbiped.report.library import displacement
+from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.report.words import NONE, number, percent, signed
 from jaxbiped.study.intervals import proportion
@@ -173,6 +174,7 @@ def borne(rows: pl.DataFrame, factor: str, unit: float, none: float) -> str:
     return " to ".join(sides)
 
 
+@own_style()
 def save_windows(path: Path, made: LibraryConfig) -> bool:
     """Draw how steps end by distance and yaw of their edge; whether there were any."""
     windows = {name: one.window for name, one in made.primitives.items() if one.window is not None}

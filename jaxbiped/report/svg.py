@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from html import escape
 
-import matplotlib
 from matplotlib.figure import Figure
+
+from jaxbiped.report.style import own_style
 
 # What a figure is drawn in, and the variable of the page that stands for it there.
 VARIABLES = {"#333333": "--ink", "#dddddd": "--line", "#f6f6f6": "--band", "#ffffff": "--paper"}
@@ -22,7 +23,7 @@ def themed() -> Iterator[None]:
     """Figures that are made in this context are drawn in the colours that `inline` knows."""
     ink = dict.fromkeys(("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"), INK)
     looks = {"font.size": 9, "axes.titlesize": 10, "axes.titleweight": "bold", "figure.facecolor": "none"}
-    with matplotlib.rc_context({**ink, **looks, "axes.facecolor": "none", "axes.labelsize": 9}):
+    with own_style(ink | looks | {"axes.facecolor": "none", "axes.labelsize": 9}):
         yield
 
 
@@ -35,7 +36,7 @@ def inline(figure: Figure, name: str, description: str) -> str:
     """
     buffer = io.StringIO()
     options = {"svg.fonttype": "none", "svg.hashsalt": name}
-    with matplotlib.rc_context(options):
+    with own_style(options):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]

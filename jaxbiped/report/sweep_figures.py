@@ -12,6 +12,7 @@ from matplotlib.patches import Rectangle
 
 from jaxbiped.report.answer import MEASURES, SUCCESS, TIME, Measure, part
 from jaxbiped.report.figures import INK, error_bars, legend_above, look, style
+from jaxbiped.report.style import own_style
 from jaxbiped.study import Estimate
 from jaxbiped.study.pointwise import PointResult, SweepResult
 
@@ -95,6 +96,7 @@ def sweep_figure(result: SweepResult, axes: Sequence[str]) -> tuple[Figure, str]
     return dots(result), "Each dot is a sweep point, drawn over each of the swept fields."
 
 
+@own_style()
 def line(result: SweepResult, field: str) -> Figure:
     """Success of each strategy, and the differences of the question's pair, against one field."""
     panels = difference_panels(result)
@@ -119,6 +121,7 @@ def line(result: SweepResult, field: str) -> Figure:
     return figure
 
 
+@own_style()
 def heat_map(result: SweepResult, field_y: str, field_x: str, panels: Sequence[Panel] = ()) -> Figure:
     """A map for each quantity over two axes, each cell with its number."""
     panels = panels or difference_panels(result) or rate_panels(result)
@@ -159,6 +162,7 @@ def fill_map(ax: Axes, values: np.ndarray, shown: np.ndarray, panel: Panel) -> N
     ax.tick_params(length=0)
 
 
+@own_style()
 def dots(result: SweepResult) -> Figure:
     """A column for each field, a row for success and one for the question's pair in time."""
     fields, panels = result.fields, [None, *difference_panels(result, (TIME,))]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from jaxbiped.files import write_whole
 from jaxbiped.report.figures import GRID, INK, saver, style
+from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown
 from jaxbiped.report.words import NONE, brackets, number, percent, signed
 from jaxbiped.study.durations import Fit
@@ -102,6 +103,7 @@ def sentence(tuning: Tuning) -> str:
     return f"The tuned costs change the objective by {change} s {limits} on the test arenas: {verdict}."
 
 
+@own_style()
 def picture(tuning: Tuning) -> Figure:
     """Costs and objective over the steps, and what came of it on the test arenas."""
     figure = Figure(figsize=(11.0, 3.6), layout="constrained")

@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import os
 import socket
 import time
 import uuid
@@ -28,6 +27,7 @@ from distributed.core import rpc
 from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 
+from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
 from jaxbiped.mission.queue import Tally
@@ -245,7 +245,7 @@ def knock(scheduler: str) -> None:
 @contextlib.contextmanager
 def local_cluster(workers: int) -> Iterator[Client]:
     """A client of worker processes on this machine, among which its cores are shared out; they end with it."""
-    threads = max(1, len(os.sched_getaffinity(0)) // workers)
+    threads = max(1, cores() // workers)
     with (
         LocalCluster(
             n_workers=workers,

@@ -19,6 +19,7 @@ from jaxbiped import arenas as arena_room
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
 from jaxbiped.devices import by_rows, mesh_of
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import (
@@ -83,6 +84,7 @@ def evaluate(
         before = last[0]
 
 
+@with_own_settings
 def compute(
     config: StudyConfig,
     group: Group,
@@ -112,6 +114,7 @@ def compute(
     return frame(np.arange(shard.first, shard.first + shard.count), batch, group, config.strategies, result, plan)
 
 
+@with_own_settings
 @partial(jax.jit, static_argnames=("families",))
 def draw(
     key: PRNGKeyArray, index: Int[Array, "A"], families: tuple[str, ...], populations: Population | None = None
@@ -133,6 +136,7 @@ def draw(
     return batch, seeds
 
 
+@with_own_settings
 def run_all(
     batch: Arena,
     seeds: UInt32[Array, "A"],
@@ -214,6 +218,7 @@ def run_threads(
             raise
 
 
+@with_own_settings
 def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
     """The oracle plans of all points [P * S] on the arenas [A] of their populations, all on the host."""
     kinds = len(group.population_of)

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Array, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import OnProgress, Result, Tally, ending, no_results
@@ -21,6 +22,7 @@ from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.camera import CameraConfig
 
 
+@with_own_settings
 def run_on_host(
     batch: Arena,
     seeds: UInt32[Array, "A"],

@@ -8,9 +8,9 @@ from typing import Any
 
 import polars as pl
 
+from jaxbiped import files
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.files import refuse_existing
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
 from jaxbiped.study.schema import validate
@@ -67,7 +67,7 @@ def refuse_taken(folder: Path) -> None:
     if (folder / MANIFEST).exists() and read_manifest(folder).state != "finished":
         message = "holds a study that is not finished: --resume goes on with it"
         raise InputError(message, field="out", value=str(folder))
-    refuse_existing(folder)
+    files.refuse_existing(folder)
 
 
 def begun(folder: Path) -> bool:
@@ -98,8 +98,7 @@ def is_scrap(path: Path) -> bool:
 def sweep_up(folder: Path) -> None:
     """Remove what a killed writer was writing."""
     for place in (folder, folder / ROWS):
-        for path in place.glob(".*.part"):
-            path.unlink(missing_ok=True)
+        files.sweep_up(place)
 
 
 def refuse_finished(folder: Path, manifest: Manifest) -> None:

@@ -15,6 +15,7 @@ from jaxbiped import mapping
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
 from jaxbiped.mission.cycle import sense
@@ -105,12 +106,14 @@ def looking(config: MissionConfig, eyes: Eyes | None) -> Look:
     return look
 
 
+@with_own_settings
 @partial(jax.jit, static_argnames=("program",))
 def measured(world: World, mind: Mind, arena: Arena, settings: Settings, program: Program):
     """What a sensor that is JAX measures."""
     return jax.vmap(partial(sense, program=program, carriage=None))(world, mind, arena, settings)
 
 
+@with_own_settings
 @partial(jax.jit, static_argnames=("program",))
 def standing(
     arena: Arena, settings: Settings, seed: UInt32[Array, "1"], pose: Pose, number: Array, program: Program
@@ -121,6 +124,7 @@ def standing(
     return replace(world, pose=pose, decisions=number[None]), replace(mind, belief=replace(mind.belief, pose=pose))
 
 
+@with_own_settings
 def fused(world: Place, look: Look, config: MissionConfig) -> tuple[Int8[np.ndarray, "H W"], Int8[np.ndarray, "H W"]]:
     """Classes and levels of the map of all views of a world, each from its known place."""
     spec, settings = config.grid(AREA), config.settings("full")
@@ -154,6 +158,7 @@ class Outcome:
     time: float  # [s]
 
 
+@with_own_settings
 def mission(world: Place, config: MissionConfig, eyes: Eyes | None) -> Outcome:
     """One mission of strategy `full` in a world."""
     arena, settings = jax.tree.map(jnp.asarray, (world.arena, config.settings("full")))

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import shlex
-import sys
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,6 +25,7 @@ from jaxbiped.files import reason, write_whole
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
 from jaxbiped.study.schema import SCHEMA, STRATEGIES, validate
+from jaxbiped.terminal import command_line
 
 POINTS, ROWS = "points.parquet", "rows"
 
@@ -135,7 +134,7 @@ def create(
     refuse_filled(folder)
     manifest = Manifest(
         state="running",
-        command=command if command is not None else shlex.join(["jaxbiped", *sys.argv[1:]]),
+        command=command if command is not None else command_line(),
         config=config.model_dump(mode="json"),
         config_hash=config_hash(config),
         versions=versions(),

@@ -15,6 +15,7 @@ from jaxtyping import Float, Int
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.settings import MissionConfig, Settings, program
@@ -35,6 +36,7 @@ class Trials:
     families: tuple[str, ...]
     seed: int
 
+    @with_own_settings
     def __call__(
         self,
         costs: Float[np.ndarray, "P 5"],

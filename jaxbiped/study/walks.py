@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Array, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.queue import Jobs, OnProgress, Result
@@ -15,6 +16,7 @@ from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.walking import walk
 
 
+@with_own_settings
 def walk_all(
     batch: Arena,
     seeds: UInt32[Array, "A"],

@@ -9,7 +9,8 @@ import pytest
 
 from jaxbiped import planning
 from jaxbiped.mission.oracle import oracle_plan
-from jaxbiped.mission.queue import SLOTS, stack
+from jaxbiped.mission.queue import COMPILED, SLOTS, stack
+from jaxbiped.mission.stepped import run_bare
 from tests.mission.conftest import PROGRAM, SETTINGS, pad, play
 
 EVENTS = []
@@ -95,3 +96,25 @@ def test_planning_of_a_full_set_of_slots_compiles_inside_a_program(batch):
     costs = planning.Costs(*jnp.ones((5, batch)))
     far = jnp.full((batch, 2), 20, jnp.int32)
     assert plan(classes, classes * 0, costs, far, far * 0)[:, 0].tolist() == [1] * batch
+
+
+def test_a_script_with_other_settings_of_jax_gets_the_same_missions_and_compiles_nothing(population, played):
+    before = set(COMPILED)
+    with jax.enable_x64(True), jax.numpy_rank_promotion("raise"), jax.default_prng_impl("rbg"):
+        again = play(*population[:3])
+    jax.tree.map(np.testing.assert_array_equal, again, played)
+    assert set(COMPILED) == before
+
+
+def test_a_mission_of_one_robot_is_the_same_in_a_script_that_has_x64_on(population):
+    arenas, settings, seeds, _ = population
+    plain = run_bare(arenas[0], settings[0], seeds[0], PROGRAM)
+    with jax.enable_x64(True):
+        wide = jax.tree.map(lambda leaf: leaf.astype("float64") if leaf.dtype == "float32" else leaf, arenas[0])
+        again = run_bare(wide, settings[0], seeds[0], PROGRAM)
+        planned = oracle_plan(pad([wide], 1), pad([settings[0]], 1), PROGRAM)
+    jax.tree.map(np.testing.assert_array_equal, again, plain)
+    assert {leaf.dtype.itemsize for leaf in jax.tree.leaves((again, planned))} <= {1, 4}
+    jax.tree.map(
+        np.testing.assert_array_equal, planned, oracle_plan(pad([arenas[0]], 1), pad([settings[0]], 1), PROGRAM)
+    )

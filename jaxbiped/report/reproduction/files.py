@@ -40,7 +40,9 @@ def write(out: Path, found: Findings, args: dict[str, Any], facts: dict[str, str
         missions(found).write_parquet(buffer)
         write_whole(folder / MISSIONS, saver(buffer.getvalue()))
         for each in found.populations:
-            each.both.write_parquet(folder / f"saved_{each.executor}.parquet")
+            buffer = io.BytesIO()
+            each.both.write_parquet(buffer)
+            write_whole(folder / f"saved_{each.executor}.parquet", saver(buffer.getvalue()))
         pictures = save_pictures(folder, found)
         for item in EXPERIMENTS:
             (folder / item.scene).mkdir()

@@ -17,6 +17,7 @@ from jaxbiped.report.examples import picture
 from jaxbiped.report.measured import screen, voxel_figure
 from jaxbiped.report.plots import WIDTH, Plot
 from jaxbiped.report.reproduction.pictures import map_figure
+from jaxbiped.report.style import own_style
 
 MOST_POINTS = 12_000  # drawn
 INK_AREA = 15_000.0  # [points2] of all their marks
@@ -48,6 +49,7 @@ def making_of(log: MissionLog, t: int, robot: RobotConfig) -> list[Plot]:
     return plots
 
 
+@own_style()
 def eyes_figure(shot: Picture) -> Figure:
     """The left image, and its disparities."""
     figure = Figure(figsize=(WIDTH, WIDTH * 0.39), layout="constrained")
@@ -58,6 +60,7 @@ def eyes_figure(shot: Picture) -> Figure:
     return figure
 
 
+@own_style()
 def points_figure(points: Float32[np.ndarray, "N 3"]) -> Figure:
     """Points in the view of the 3D grid, x away from the viewer; of many, every so many."""
     figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")

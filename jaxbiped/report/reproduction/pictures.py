@@ -8,6 +8,7 @@ from jaxbiped.mission.log import MissionLog
 from jaxbiped.report.examples import picture
 from jaxbiped.report.pictures import draw_map, moment
 from jaxbiped.report.plots import WIDTH, Plot
+from jaxbiped.report.style import own_style
 
 KEY = (
     "Maps as the robot held them: grey floor, blue bump with its level, purple gate, red obstacle and all that is too "
@@ -16,6 +17,7 @@ KEY = (
 )
 
 
+@own_style()
 def map_figure(log: MissionLog, t: int, *, plan: bool = True) -> Figure:
     """The map at a moment, with the plan ahead and the track so far."""
     figure = Figure(figsize=(WIDTH, WIDTH * float(log.size_xy[1] / log.size_xy[0])), layout="constrained")

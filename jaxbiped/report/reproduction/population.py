@@ -13,6 +13,7 @@ from jaxbiped.report.figures import canvas, style
 from jaxbiped.report.grid import to_grid
 from jaxbiped.report.page import Section
 from jaxbiped.report.plots import WIDTH, Plot
+from jaxbiped.report.style import own_style
 from jaxbiped.report.svg import INK, inline, themed
 from jaxbiped.report.sweep_figures import BETTER_UP, Panel, fill_map
 from jaxbiped.report.tables import Sheet, code_sheet, pair_sheet, strategy_sheet
@@ -113,6 +114,7 @@ def ordinal(value: float) -> str:
     return text + {"1": "st", "2": "nd", "3": "rd"}.get(text[-1], "th")
 
 
+@own_style()
 def population_figure(population: Population, measure: float) -> Figure:
     """Both histograms and the map side by side."""
     figure = Figure(figsize=(2.6 * WIDTH, 3.6), layout="constrained")

@@ -1,0 +1,111 @@
+"""What a user's shell and rc files set for other programs, kept from breaking ours or changing its results.
+
+Variables that say where to compute, what to keep on disk and what to log are respected. Those that change how JAX and
+Numba compute are overridden: rows are the same in every shell. What cannot be used is named in one line.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+from jaxbiped.errors import InputError
+
+# By their whole names: devices; caches on disk; logs, dumps and tracebacks; processes of a cluster.
+RESPECTED = re.compile(
+    r"JAX_(PLATFORMS|PLATFORM_NAME|NUM_CPU_DEVICES|DEFAULT_DEVICE|\w+_VISIBLE_DEVICES|PJRT_\w+"
+    r"|COMPILATION_CACHE_\w+|ENABLE_COMPILATION_CACHE|PERSISTENT_CACHE_\w+|RAISE_PERSISTENT_CACHE_ERRORS"
+    r"|LOG_COMPILES|LOGGING_LEVEL|DEBUG_LOG_MODULES|EXPLAIN_CACHE_MISSES|DUMP_IR_\w+|TRACEBACK_\w+|INCLUDE_\w+"
+    r"|COORDINATOR_\w+|NUM_PROCESSES|PROCESS_ID|LOCAL_DEVICE_IDS)"
+    r"|NUMBA_(CACHE_DIR|DEBUG_CACHE)"
+)
+PREFIXES = ("JAX_", "NUMBA_")
+# What libraries read that we use: by these names an error of theirs is told from one of ours.
+READ = (*PREFIXES, "XLA_", "MUJOCO_", "PYOPENGL_", "MPL", "MATPLOTLIB", "POLARS_", "CUDA_", "TPU_", "PJRT_")
+OF_DEVICES = ("JAX_PLATFORMS", "JAX_PLATFORM_NAME", "JAX_NUM_CPU_DEVICES", "JAX_DEFAULT_DEVICE")
+PARSE_FLAGS = "from jaxlib import xla_client; xla_client.CompileOptions()"  # XLA ends a process whose flags are wrong
+FLAGS_TIME = 60.0  # [s] for that
+LOGGED = re.compile(r"^[EF]\d{4} \S+ +\d+ \S+\] (.*?)\.?$", re.MULTILINE)  # an error, as XLA logs it
+
+
+# Set, not removed: of Numba a .numba_config.yaml of the working folder counts for what is not set.
+SET = {"NUMBA_DISABLE_JIT": "0", "MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
+
+
+@contextlib.contextmanager
+def settled() -> Iterator[None]:
+    """Override what would change our results or fail, in a block in which JAX, Numba and matplotlib are imported.
+
+    Raises:
+      InputError: XLA would end this process for its flags, or a matplotlibrc of this folder is no text.
+    """
+    foreign = {name for name in os.environ if name.startswith(PREFIXES) and not RESPECTED.fullmatch(name)}
+    before = {name: os.environ.pop(name, None) for name in foreign | SET.keys()}
+    os.environ.update(SET)
+    try:
+        with warnings.catch_warnings():
+            if os.environ.get("PYTHONWARNINGS"):
+                warnings.resetwarnings()  # "error" would make an error of what any library warns of
+                warnings.simplefilter("default")
+            check_matplotlibrc(Path("matplotlibrc"))
+            if os.environ.get("XLA_FLAGS") and "jax" not in sys.modules:
+                check_flags(os.environ["XLA_FLAGS"])
+            yield
+    finally:
+        for name in SET:
+            os.environ.pop(name, None)
+        os.environ.update({name: value for name, value in before.items() if value is not None})
+
+
+def check_matplotlibrc(file: Path) -> None:
+    """Raise `InputError` where matplotlib would fail to read its settings: it looks in the working folder first."""
+    if file.is_file():
+        try:
+            file.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"cannot be read as text: {error}", file=file) from None
+
+
+def check_flags(flags: str) -> None:
+    """Raise `InputError` where XLA does not know its flags, as it says in a process of its own."""
+    try:
+        command = [sys.executable, "-c", PARSE_FLAGS]
+        run = subprocess.run(command, check=False, capture_output=True, text=True, timeout=FLAGS_TIME)
+    except (OSError, subprocess.SubprocessError):
+        return  # then XLA has to say it
+    if run.returncode and (said := LOGGED.search(run.stderr)):
+        raise InputError(f"cannot be used: {said[1]}", field="XLA_FLAGS", value=flags)
+
+
+def check_devices() -> None:
+    """Raise `InputError` where JAX finds no devices, with the variable that says which it is to use."""
+    import jax
+
+    try:
+        jax.devices()
+    except Exception as error:  # RuntimeError, AssertionError, ... by backend
+        asked = next((name for name in OF_DEVICES if os.environ.get(name)), None)
+        if asked is None:
+            raise
+        said = first_line(error) or "there is no such device here"
+        raise InputError(f"no devices: {said}", field=asked, value=os.environ[asked]) from None
+
+
+def culprit(error: Exception) -> InputError | None:
+    """The one line about a variable that an error of a library names; None where it names none that is set."""
+    said = first_line(error)
+    for name, value in os.environ.items():
+        if name.startswith(READ) and value and re.search(rf"\b{name}\b", said, re.IGNORECASE):
+            return InputError(f"cannot be used: {said}", field=name, value=value)
+    return None
+
+
+def first_line(error: Exception) -> str:
+    """What an error says, without what follows its first line."""
+    return (str(error).strip().splitlines() or [""])[0]
