@@ -124,7 +124,7 @@ def classify(grid_map: GridMap, params: MapParams, spec: GridSpec) -> tuple[Int[
 
     A cell with fewer than `params.fused_points` votes is unmeasured. A tie goes to the class that is harder to cross.
     A floor cell has level 0 and a bump cell the raised level with most votes; others have the level with most votes
-    (a tie goes to the lower). Under `jit` NaN compares false.
+    (a tie goes to the lower). Under `jit` NaN compares false. Both are integers: for derivatives, use `grid_map.votes`.
 
     Raises:
       InputError: an argument of another rank, shape or type, or with NaN.

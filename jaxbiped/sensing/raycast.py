@@ -35,6 +35,9 @@ def measure(
     camera to the feet, `squat` lowers it. Rays that measured nothing, or a range beyond `noise.max_range`, have weight
     0 and lie at the origin; so do all when the pose is not finite.
 
+    What a ray meets is found by comparing bits, so derivatives do not tell how points move with the pose or the boxes:
+    use differences of measurements with one seed, or `measure_oracle`.
+
     Raises:
       InputError: an argument of another rank, shape or type, a camera that `check_camera` refuses, NaN in `noise`.
     """
