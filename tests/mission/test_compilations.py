@@ -106,6 +106,7 @@ def test_a_script_with_other_settings_of_jax_gets_the_same_missions_and_compiles
     assert set(COMPILED) == before
 
 
+@pytest.mark.slow  # compiles three programs
 def test_a_mission_of_one_robot_is_the_same_in_a_script_that_has_x64_on(population):
     arena, setting = jax.tree.map(jnp.asarray, (population[0][0], population[1][0]))
     seed = jnp.asarray(population[2][0])
