@@ -155,8 +155,13 @@ def keep_descriptors() -> None:
 
 
 def command_line() -> str:
-    """That of this process, for people to repeat; bytes of file names that are no text become question marks."""
-    return shlex.join(["jaxbiped", *sys.argv[1:]]).encode("utf-8", "replace").decode()
+    """That of this process, for people to repeat."""
+    return legible(shlex.join(["jaxbiped", *sys.argv[1:]]))
+
+
+def legible(text: str) -> str:
+    """The name of a file as text: bytes of it that are none become question marks."""
+    return text.encode("utf-8", "replace").decode()
 
 
 class Terminated(KeyboardInterrupt):

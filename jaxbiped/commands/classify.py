@@ -18,6 +18,7 @@ from jaxbiped.files import new_folder, refuse_existing
 from jaxbiped.mapping.upright import FRAMES, Upright, find_upright, set_upright
 from jaxbiped.sensing import cloud as clouds
 from jaxbiped.sensing.cloud import Cloud
+from jaxbiped.terminal import legible
 
 Vector = Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")]
 
@@ -62,7 +63,7 @@ def main(args: ClassifyArgs) -> int:
     T[:3, :3] = upright.R
     T[:3, 3] = upright.shift - upright.R @ cloud.origin + np.array([away[0], away[1], 0])
     with new_folder(out) as folder:
-        names = write_chart(made, folder, args, args.cloud.name)
+        names = write_chart(made, folder, args, legible(args.cloud.name))
         summary = {
             "config": args.model_dump(mode="json"),
             "points": len(cloud.points),

@@ -24,6 +24,7 @@ from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, next_step
 from jaxbiped.report import pictures
+from jaxbiped.terminal import legible
 
 Cost = Annotated[float, Field(ge=0.0, le=1e6)]
 Position = Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="X Y")]
@@ -215,7 +216,7 @@ def write(source: MapSource, plan: Plan, folder: Path, args: PlanArgs) -> None:
     pictures.save_map(
         folder / "map.png",
         grid,
-        title=f"{args.file.name}: cost {plan.costs[-1]:.6g}, {plan.length * grid.pitch:.4g} m",
+        title=f"{legible(args.file.name)}: cost {plan.costs[-1]:.6g}, {plan.length * grid.pitch:.4g} m",
         plan_xy=xy,
         start_xy=tuple(xy[0]),
         goal_xy=tuple(xy[-1]),

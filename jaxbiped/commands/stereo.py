@@ -25,6 +25,7 @@ from jaxbiped.sensing.stereo.matching import MatchParams, match
 from jaxbiped.sensing.stereo.order import check_order
 from jaxbiped.sensing.stereo.points import to_points, useful_range
 from jaxbiped.sensing.stereo.rectify import Rig
+from jaxbiped.terminal import legible
 
 UNKNOWN_CONE = math.radians(65.0)  # of a camera that is held upright, pitched by any angle
 KNOWN_CONE = math.radians(5.0)  # that a pose from the camera file may be off
@@ -96,7 +97,7 @@ def main(args: StereoArgs) -> int:
 
         save_ply(folder / "points.ply", points, as_rgb(left)[kept])
         measured.save_disparity(folder / "disparity.png", left, disparity.value, disparity.valid)
-        names = write_chart(made, folder, args, args.left.name, camera_xy=(0.0, 0.0))
+        names = write_chart(made, folder, args, legible(args.left.name), camera_xy=(0.0, 0.0))
         write_json(
             folder / "stereo.json",
             {

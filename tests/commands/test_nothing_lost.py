@@ -3,6 +3,9 @@
 import errno
 import io
 import os
+import shutil
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -58,6 +61,19 @@ def test_a_full_disk_leaves_nothing_half_written(case, monkeypatch, capsys):
     lines = [line for line in capsys.readouterr().err.splitlines() if line.startswith("jaxbiped: ")]
     assert len(lines) == 1 and "no space left on device" in lines[0] and "cannot be written" in lines[0]
     assert everything() == before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems refuse such names")
+@pytest.mark.parametrize("name", ["plan", "classify"])
+def test_names_of_files_that_are_no_text_cost_no_result(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    CASES[name].prepare(tmp_path, monkeypatch)
+    given = Path(CASES[name].argv[1])
+    odd = os.fsdecode(b"r\xe9") + given.suffix
+    shutil.copy(given, odd)
+    assert cli.main([name, odd, *CASES[name].argv[2:]]) == 0
+    assert all(os.path.exists(path) for path in CASES[name].stored)
+    assert f"r?{given.suffix}" in capsys.readouterr().out
 
 
 def everything():
