@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.core.batching import fold, folding_vmap, unfold, without_gradient
 from jaxbiped.core.checks import cells, leading_shape, reals
-from jaxbiped.devices import by_rows, mesh_of
+from jaxbiped.devices import by_rows, cores, mesh_of
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled, wavefront
 from jaxbiped.planning.arguments import are_classes, grid_arguments
@@ -185,7 +184,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
         return _differentiated(solve, method)(jax.tree.map(jnp.asarray, inputs))
     if batch <= CHUNK or jax.default_backend() != "cpu":
         return solve(jax.tree.map(jnp.asarray, inputs), method)
-    size = min(batch, CHUNK * -(-batch // (CHUNK * PIECES * (os.cpu_count() or 1))))
+    size = min(batch, CHUNK * -(-batch // (CHUNK * PIECES * cores())))
     out = CostToGo(compiled.aligned((batch, *grid), np.float32), np.empty(batch, np.int32), np.empty(batch, bool))
     direct = solve is _field and method == "line_sweep"
     inputs, valid = _prepared(inputs) if direct else (jax.tree.map(np.asarray, inputs), True)
@@ -199,7 +198,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
         else:
             jax.tree.map(lambda whole, a: np.copyto(whole[rows], a), out, solve(part, method))
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         list(pool.map(piece, range(0, batch, size)))
     out.converged[:] &= valid
     return jax.device_put(out)  # which takes arrays over as they are, where `jnp.asarray` copies

@@ -49,6 +49,15 @@ def test_costs_are_those_of_dijkstra_on_the_true_grid(population, plans):
             assert plans.cost[p, k] == pytest.approx(cost, rel=1e-5)
 
 
+def test_plans_are_the_same_in_any_batch():
+    """To the last bit: a length that is summed would depend on how a batch of its size is added up."""
+    points = jax.tree.map(jnp.asarray, stack([CONFIG.settings(name) for name in ("full", "floor_only")]))
+    arenas, _ = draw(jax.random.key(0), jnp.arange(48), FAMILIES)
+    whole = jax.device_get(oracle_plan(arenas, points, PROGRAM))
+    part = jax.device_get(oracle_plan(jax.tree.map(lambda leaf: leaf[:3], arenas), points, PROGRAM))
+    jax.tree.map(lambda a, b: np.testing.assert_array_equal(a, b[:, :3]), part, whole)
+
+
 def test_more_daring_never_costs_more(plans):
     cost = dict(zip(STRATEGIES, np.where(plans.reachable, plans.cost, np.inf), strict=True))
     for bolder, shyer in (("full", "bump_aware"), ("full", "gate_aware"), ("bump_aware", "floor_only"),

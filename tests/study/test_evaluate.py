@@ -10,6 +10,7 @@ from jaxbiped.arenas.families import FAMILIES
 from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.mission import queue
 from jaxbiped.mission.queue import stack
+from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import draw, evaluate
 from jaxbiped.study.schema import validate
 from jaxbiped.study.sweep import SweepConfig
@@ -61,6 +62,18 @@ def test_each_row_is_that_of_its_point_alone(swept):
     key = ("point", "strategy", "arena")
     assert first.sort(key).equals(expected.sort(key))
     assert rows["oracle_cost"].n_unique() > 64  # the costs do count
+
+
+@pytest.mark.slow  # a program for each batch
+def test_every_column_of_every_row_is_the_same_in_any_batch():
+    frames = {}
+    for arenas, shard in ((48, 48), (16, 16), (5, 5), (1, 1), (48, 7)):
+        config = StudyConfig(arenas=arenas, shard=shard)
+        frames[arenas, shard] = pl.concat(frame for _, frame in evaluate(config)).sort("arena", "strategy")
+    whole = frames[48, 48]
+    for (arenas, shard), frame in frames.items():
+        same = whole.filter(pl.col("arena") < arenas)
+        assert [name for name in frame.columns if not frame[name].equals(same[name])] == [], (arenas, shard)
 
 
 @pytest.mark.slow  # two more compilations of the whole loop
