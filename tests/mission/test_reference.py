@@ -11,8 +11,12 @@ from tests.reference import mission as reference
 METRES, SECONDS, RADIANS = 1e-4, 0.01, 1e-3
 # A point within 1e-7 m of a voxel's border may fall on either side, and then a cell may be classed otherwise. Missions
 # that part over such a cell may be this share of all. (None of the first 88 that were tried did.)
-MAY_PART = 0.1
-BORDER_POINTS = 1e-3  # share of all points that lay at such borders, at most, when two missions parted
+MAY_PART = 0.05
+BORDER_POINTS = 3e-4  # share of all points that lay at such borders, at most: up to 1.8e-4 was seen
+MEAN_BORDER_POINTS = 5e-5  # the same on average, of which 1.8e-5 was seen
+# Maps that are the same to the last point: how many are depends on how a processor rounds (of two kinds that were tried,
+# 78 % of the maps on one and over 80 % on the other), so that the two bounds above are the ones that are sharp.
+SAME = 0.7
 
 
 @pytest.fixture(scope="session")
@@ -47,7 +51,7 @@ def test_missions_are_the_same(population, plain, played):
 
 
 def test_maps_and_commands_are_the_same_until_a_point_lies_on_a_border(plain, stepped):
-    decisions = clean = 0
+    share = []
     for k, (mission, log) in enumerate(zip(plain, stepped, strict=True)):
         at = parted_at(mission, log)
         for t, step in enumerate(mission.steps[: None if at is None else at + 1]):
@@ -56,8 +60,8 @@ def test_maps_and_commands_are_the_same_until_a_point_lies_on_a_border(plain, st
             assert moved < BORDER_POINTS, (k, t)
             assert moved > 0 or not other.any(), (k, t, "same points, other map")
             assert t != at or other.any(), (k, t, "same map, other command")
-            decisions, clean = decisions + 1, clean + (moved == 0)
-    assert clean > 0.8 * decisions > 300  # most maps are the same to the last point
+            share.append(moved)
+    assert len(share) > 300 and np.mean(share) < MEAN_BORDER_POINTS and np.mean(np.equal(share, 0)) > SAME
 
 
 def test_all_strategies_and_families_took_part(population, plain):
