@@ -1,4 +1,4 @@
-"""Golden rows: missions of every strategy, sensor, executor, planner and way of localisation, as they were.
+"""Golden rows: missions of every strategy, and of the sensors, executors and planners that are JAX, as they were.
 
 They guard a refactoring bit for bit. `python -m tests.study.golden NAME ...` writes those of the named kinds anew, by
 default all: where a change of behaviour is wanted, and the commit that brings it says which rows changed, and why.
@@ -17,22 +17,12 @@ from jaxbiped.study.evaluate import evaluate
 
 FOLDER = Path(__file__).parents[1] / "data" / "golden"
 EVERY = {"arenas": 12}
-FEW = {"arenas": 2, "families": ("bump", "gate"), "strategies": ("full",)}
 KINDS = {  # a study each; those of `QUICK` in the quick suite
     "raycast": EVERY | {"mission": {}},
     "oracle": EVERY | {"mission": {"sensor": "oracle"}},
-    "real": EVERY | {"mission": {"preset": "real"}, "strategies": ("full", "floor_only")},
     "sampled": EVERY | {"mission": {"executor": "sampled"}, "strategies": ("full", "floor_only")},
     "heading": EVERY | {"mission": {"planner": "heading"}, "strategies": ("full", "gate_aware")},
     "pitch": EVERY | {"mission": {"pitch": 0.1}, "strategies": ("full", "bump_aware")},
-    "traffic": {"arenas": 4, "families": ("traffic",), "mission": {"mapping": {"fade": 60.0}}},
-    "visual": FEW | {"mission": {"localisation": "visual"}},
-    "icp": FEW | {"mission": {"localisation": "icp"}},
-    "both": FEW | {"mission": {"localisation": "both"}},
-    "odometry": FEW | {"mission": {"localisation": "odometry"}},
-    "stereo": FEW | {"mission": {"sensor": "stereo", "limits": {"max_decisions": 8}}},
-    "native": FEW | {"mission": {"executor": "native", "limits": {"max_decisions": 8}}},
-    "mjx": FEW | {"arenas": 1, "families": ("bump",), "mission": {"executor": "mjx", "limits": {"max_decisions": 2}}},
 }
 QUICK = ("raycast",)
 # Programs for processors of other kinds round otherwise; rows of another kind are compared within this share.
