@@ -14,8 +14,8 @@ METRES, SECONDS, RADIANS = 1e-4, 0.01, 1e-3
 MAY_PART = 0.05
 BORDER_POINTS = 3e-4  # share of all points that lay at such borders, at most: up to 1.8e-4 was seen
 MEAN_BORDER_POINTS = 5e-5  # the same on average, of which 1.8e-5 was seen
-# Maps that are the same to the last point: how many are depends on how a processor rounds (of two kinds that were
-# tried, 78 % of the maps on one and over 80 % on the other), so that the two bounds above are the ones that are sharp.
+# Maps that are the same to the last point: how many are depends on how a processor rounds. On one kind 78 % are; there
+# a bound of 80 % failed that had held on another. So this one is wider, and the two above are the ones that are sharp.
 SAME = 0.7
 
 
