@@ -22,6 +22,7 @@ KINDS = {  # primitive: which of C1 to C3 its move pays, and how it climbs
     Primitive.STEP_DOWN_BUMP: (3, -1),
 }
 OBLIQUE = (1.0, math.sqrt(2.0))  # straight and oblique moves, in cells
+ROUNDING = 1e-9  # of the longest move; how a solution of nothing is rounded depends on the processor
 
 
 @dataclass(frozen=True)
@@ -97,6 +98,6 @@ def fit(durations: DurationConfig, *, oblique: bool = True, measuring: bool = Fa
         both, _ = nnls(merged, measured)
         found = np.array([both[0], *both])
     unit = (found[0] + found[1]) / FLOOR_CELL
-    if unit <= 0:
+    if not unit > ROUNDING * measured.max():
         raise ValueError("a straight move on the floor must take time")
     return Fit(found / unit, float(unit), tuple(names), measured, design @ found)
