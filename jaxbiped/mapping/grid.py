@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 import jax
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from jaxbiped.errors import InputError
@@ -89,3 +90,16 @@ class Body:
     standing: Float[Array, "*B"]  # [m] head height, standing
     squatting: Float[Array, "*B"]  # [m] head height, squatting
     step: Float[Array, "*B"]  # [m] greatest height of one step up or down
+    step_tolerance: Float[Array, "*B"]  # [m] what is higher than a step by more is touched
+    height_tolerance: Float[Array, "*B"]  # [m] the ground may be off the height stepped to
+
+
+def patch_sum(planes: Float[Array, "K H W"], spec: GridSpec) -> Float[Array, "K H W"]:
+    """Sums over the patch of about 5 x 5 cm around each cell, at least its own; beyond the rim there is nothing."""
+    aside = int(0.025 / spec.pitch + 1e-6)  # cells on each side that make up the patch
+    if not aside:
+        return planes
+    height, width = planes.shape[1:]
+    padded = jnp.pad(planes, ((0, 0), (aside, aside), (aside, aside)))
+    rows = sum(padded[:, i : i + height] for i in range(2 * aside + 1))
+    return sum(rows[..., j : j + width] for j in range(2 * aside + 1))
