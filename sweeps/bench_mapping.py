@@ -84,7 +84,7 @@ def main():
     parser.add_argument("--repeats", type=int, default=7, help="the best of so many runs counts")
     options = parser.parse_args()
     views, poses = inputs(options.views)
-    body = Body(*(np.float32(v) for v in (0.10, 0.385, 0.34, 0.03)))
+    body = Body(*(np.float32(v) for v in (0.10, 0.385, 0.34, 0.03, 0.002, 0.010)))
     params = jax.tree.map(np.asarray, MapConfig().params())
     cores = os.cpu_count() or 1
     rays, (rows, columns) = views.x.shape[-1], SPEC.shape

@@ -4,7 +4,7 @@ from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
 from jaxbiped.arenas.families import FAMILIES, KNOWN, MOVING, sample
 from jaxbiped.arenas.movers import Movers, at_time, only
 from jaxbiped.arenas.population import Population, PopulationConfig
-from jaxbiped.arenas.scene import SceneConfig, load_scene, to_arena
+from jaxbiped.arenas.scene import SceneConfig, load_scene, scene_warnings, to_arena
 
 __all__ = [
     "CIRCLE",
@@ -22,5 +22,6 @@ __all__ = [
     "load_scene",
     "only",
     "sample",
+    "scene_warnings",
     "to_arena",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Protocol, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
@@ -151,6 +151,57 @@ def _check(scene: SceneConfig, path: str | Path) -> None:
             if between and distance(box, point) < START_CLEARANCE:
                 message = f"must be at least {START_CLEARANCE:g} m away from boxes.{m}, an obstacle there"
                 raise InputError(message, file=path, field=field, value=list(point))
+
+
+@runtime_checkable
+class Measures(Protocol):
+    """What warnings read of a robot; `motion.robot.RobotConfig` has it."""
+
+    body_radius: float  # [m]
+    standing: float  # [m]
+    step: float  # [m]
+    step_tolerance: float  # [m]
+
+
+def scene_warnings(arena: Arena, robot: Measures, level_height: float) -> tuple[str, ...]:
+    """What a person should know of a scene before this robot walks in it: one line each, first the start.
+
+    The robot starts in an obstacle (`load_scene` refuses only what is one to the robot of the paper), or a box is a
+    trap: higher than the robot's step over what it stands on, and lower than what is an obstacle by its level alone
+    (from `level_height` [m] times a half on). Such ground is told from a bump by a few millimetres.
+    """
+    boxes = [BoxConfig(**box) for box in _rows(arena)]
+    x, y = (float(v) for v in arena.start_xyyaw[:2])
+    ground = max((box.top for box in boxes if box.bottom == 0 and distance(box, (x, y)) == 0), default=0.0)
+    bears, found = robot.step + robot.step_tolerance, []
+    for m, box in enumerate(boxes):
+        between = box.top > ground + bears + 1e-6 and box.bottom < ground + robot.standing - 1e-6
+        if between and distance(box, (x, y)) < robot.body_radius:
+            found.append(
+                f"start: this robot, {robot.body_radius:g} m in radius, starts in boxes.{m} (at [{x:g}, {y:g}])"
+            )
+    obstacle = (math.ceil(robot.step / level_height + 0.5 - 1e-9) - 0.5) * level_height
+    for m, box in enumerate(boxes):
+        under = [b.top for b in boxes if b.bottom == 0 and b.top < box.top and distance(b, box.centre) == 0]
+        rise = box.top - max(under, default=0.0)
+        if box.bottom == 0 and bears + 1e-6 < rise < obstacle - 1e-6:
+            found.append(
+                f"boxes.{m}.top: is {rise:g} m high, more than this robot's step of {robot.step:g} m and less than the "
+                f"{obstacle:g} m from which it is an obstacle by its level (got {box.top:g})"
+            )
+    return tuple(found)
+
+
+def _rows(arena: Arena) -> list[dict]:
+    """The boxes in use of one arena as fields of `BoxConfig`, in numbers as they were written."""
+    leaves = (arena.boxes.x, arena.boxes.y, arena.boxes.half_x, arena.boxes.half_y, arena.boxes.yaw, arena.boxes.bottom,
+              arena.boxes.top)  # fmt: skip
+    used = np.flatnonzero(np.asarray(arena.boxes.used))
+    rows = [[round(float(leaf[m]), 6) for leaf in map(np.asarray, leaves)] for m in used]
+    return [
+        {"centre": (x, y), "size": (2 * a, 2 * b), "yaw": yaw, "bottom": low, "top": top}
+        for x, y, a, b, yaw, low, top in rows
+    ]
 
 
 def distance(box: BoxConfig, point: tuple[float, float]) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
@@ -12,7 +13,7 @@ import jax
 import pydantic
 import tyro
 
-from jaxbiped.arenas import load_scene
+from jaxbiped.arenas import load_scene, scene_warnings
 from jaxbiped.config import Model, config_hash
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.eyes import eyes_for
@@ -56,6 +57,8 @@ def main(args: RunArgs) -> int:
     refuse_existing(out)
     name, arena = load_scene(args.scene)
     static = program(args.mission, tuple(round(float(v), 6) for v in arena.size_xy))
+    for text in scene_warnings(arena, args.mission.robot, static.spec.level_height):
+        print(f"jaxbiped: warning: {args.scene}: {text}", file=sys.stderr)
     play = run_logged
     if args.mission.executor in SIMULATED:
         from jaxbiped.mission.walking import rehearse, walk_logged  # loads MuJoCo

@@ -2,7 +2,7 @@
 
 from jaxbiped.mapping.cobstacles import c_obstacles
 from jaxbiped.mapping.grid import Body, Cell, GridSpec
-from jaxbiped.mapping.gridmap import GridMap, classify, empty, mark_footprint, update
+from jaxbiped.mapping.gridmap import GridMap, classify, empty, ground_height, mark_footprint, update
 from jaxbiped.mapping.leveling import level_view
 from jaxbiped.mapping.params import MapConfig, MapParams
 from jaxbiped.mapping.truth import truth_grid
@@ -17,6 +17,7 @@ __all__ = [
     "c_obstacles",
     "classify",
     "empty",
+    "ground_height",
     "level_view",
     "mark_footprint",
     "truth_grid",

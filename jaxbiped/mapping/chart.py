@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -16,14 +16,13 @@ from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.mapping.cover import Slices, chunks, cover_slices
 from jaxbiped.mapping.grid import MOST_CELLS, Body, Cell, GridSpec
 from jaxbiped.mapping.gridmap import classify, empty, update
 from jaxbiped.mapping.params import MapParams
+from jaxbiped.mapping.roofs import cover_above, find_roofs
 from jaxbiped.sensing.view import View
 
-AT_ONCE = 1_000_000  # points that are put into voxels at a time: memory stays bounded
-MOST_WAITING = 16_000_000  # cubes that are remembered before those seen twice are struck out
-CUBE = 0.01  # [m] points of one cube this wide count once
 COVERED = 12.5  # [cm2] of 5 x 5 cm that a scan is taken to cover; sparser ones count for more
 
 
@@ -43,12 +42,15 @@ class ChartConfig(Model):
     """[cm2] a cell with less is unmeasured"""
     head_margin: float = Field(0.0, ge=0)
     """[m] how far a voxel may reach below the squatting head before it blocks"""
+    height_sd: float = Field(0.0025, ge=0)
+    """[m] to which 1 cm2 tells the height of a surface; n cm2, to a root of n less"""
 
     def params(self) -> MapParams:
         """These thresholds for `mapping.update`, to which a point then weighs what it covers."""
         named = {"voxel_points": self.voxel, "voxel_share": self.voxel_share, "solid_points": self.solid}
-        named |= {"fused_points": self.cell, "head_margin": self.head_margin, "max_range": math.inf, "fade": math.inf}
-        unused = ("view_points", "refit_slope", "refit_offset", "refit_inlier", "refit_points")
+        named |= {"fused_points": self.cell, "head_margin": self.head_margin, "height_sd": self.height_sd}
+        named |= dict.fromkeys(("max_range", "height_range", "fade"), math.inf)
+        unused = ("view_points", "refit_slope", "refit_offset", "refit_inlier", "refit_points", "height_margin")
         return MapParams(**{name: jnp.float32(value) for name, value in (named | dict.fromkeys(unused, 0.0)).items()})
 
 
@@ -119,42 +121,6 @@ def lay_out(
     return spec, (float(first[0] * pitch), float(first[1] * pitch))
 
 
-def cover_voxels(
-    points: Float[np.ndarray, "N 3"], spec: GridSpec, origin_xy: tuple[float, float]
-) -> Float32[np.ndarray, "H W Z"]:
-    """Surface [cm2] seen in each voxel, however densely: its cubes of about 1 cm that hold a point.
-
-    Points that are not finite, or outside the grid, count nothing.
-    """
-    (rows, columns), depth = spec.shape, spec.levels
-    sides = np.array([max(round(side / CUBE), 2) for side in (spec.pitch, spec.pitch, spec.level_height)])
-    corner = np.array([*origin_xy, (spec.lowest - 0.5) * spec.level_height])
-    unit = np.array([spec.pitch, spec.pitch, spec.level_height]) / sides
-    cubes = np.array([columns, rows, depth]) * sides
-    pending, waiting = [np.zeros(0, np.int64)], 0
-    for some in chunks(len(points)):
-        part = np.asarray(points[some], np.float64)
-        with np.errstate(invalid="ignore"):
-            index = np.floor((part - corner) / unit)
-            inside = ((index >= 0) & (index < cubes)).all(1)
-        x, y, z = index[inside].astype(np.int64).T
-        pending.append(distinct((y * cubes[0] + x) * cubes[2] + z))
-        waiting += len(pending[-1])
-        if waiting > MOST_WAITING:
-            pending, waiting = [distinct(np.concatenate(pending))], 0
-    keys = distinct(np.concatenate(pending))
-    z, x, y = keys % cubes[2], keys // cubes[2] % cubes[0], keys // cubes[2] // cubes[0]
-    voxel = (y // sides[1] * columns + x // sides[0]) * depth + z // sides[2]
-    count = np.bincount(voxel, minlength=rows * columns * depth)
-    return (count * (unit[0] * unit[1] / CUBE**2)).astype(np.float32).reshape(rows, columns, depth)
-
-
-def distinct(keys: Int64[np.ndarray, "n"]) -> Int64[np.ndarray, "m"]:
-    """Sorted, each once. (By a sort: for integers, `np.unique` hashes, and takes ten times as long.)"""
-    keys = np.sort(keys)
-    return keys[np.concatenate([[True], keys[1:] != keys[:-1]])] if len(keys) else keys
-
-
 def make_chart(
     points: Float[np.ndarray, "N 3"],
     spec: GridSpec,
@@ -169,7 +135,8 @@ def make_chart(
     What counts is the surface that points cover, not their number: one look holds a hundred times as many pixels near
     by as far off, and a scan has a density of its own. With pixels, a threshold that keeps phantoms out near by leaves
     walls out far off. And a cell is floor, bump or gate only where its ground was seen: with one look there is no other
-    that would tell of what stands below a table.
+    that would tell of what stands below a table. What was seen from above, with nothing below it, is filled down to the
+    floor (`find_roofs`).
 
     Args:
       points: [m] z up, the floor at 0; any number of them, finite or not.
@@ -178,35 +145,52 @@ def make_chart(
       config: thresholds: `ONE_LOOK`, `SCAN`, or others.
       sparse: count surfaces for more where the cloud is so sparse that it covers less than half of a typical cell.
     """
-    surface = cover_voxels(points, spec, origin_xy)
-    evidence = surface
+    slices = cover_slices(points, spec, origin_xy)
+    shape = (*spec.shape, spec.levels)
+    surface = np.bincount(slices.voxel, slices.surface, np.prod(shape)).astype(np.float32).reshape(shape)
+    scale = 1.0
     if sparse and surface.any():
         best = surface.max(-1)
-        evidence = evidence * max(COVERED * spec.cell_share / float(np.median(best[best > 0])), 1.0)
-    i, j, k = np.nonzero(evidence)
-    slots = 1 << max(len(i) - 1, 1).bit_length()  # powers of two, so that few sizes are ever compiled
-    padded = np.zeros((4, slots), np.float32)
-    padded[:, : len(i)] = (
-        (j + 0.5) * spec.pitch,
-        (i + 0.5) * spec.pitch,
-        (k + spec.lowest) * spec.level_height,
-        evidence[i, j, k],
-    )
-    classes, levels = (np.array(values) for values in read(View(*padded), body, config.params(), spec=spec))
+        scale = max(COVERED * spec.cell_share / float(np.median(best[best > 0])), 1.0)
+    evidence, least = surface * scale, config.voxel * spec.cell_share
+    above = cover_above(points, spec, origin_xy) * scale
+    solid = find_roofs(evidence, above, least, config.solid * spec.cell_share, spec)
+    view = points_of(slices, scale, np.flatnonzero(solid), config.solid + least, spec)
+    classes, levels = (np.array(values) for values in read(view, body, config.params(), spec=spec))
     ground = evidence[..., : spec.ground_levels - spec.lowest].sum(-1)
-    unseen = (ground < config.voxel * spec.cell_share) & (classes != Cell.OBSTACLE)
+    unseen = (ground < least) & (classes != Cell.OBSTACLE)
     classes[unseen], levels[unseen] = Cell.UNMEASURED, 0
     grid = ClassGrid(classes, levels, np.array(origin_xy, np.float64), spec.pitch)
     return Chart(grid, surface, spec)
+
+
+def points_of(slices: Slices, scale: float, filled: Int64[np.ndarray, "m"], weight: float, spec: GridSpec) -> View:
+    """A view of one point for each slice that was seen, at its mean height, and one for each voxel that is filled.
+
+    Args:
+      scale: of the surfaces; `filled` are indices into a flat grid, and `weight` is that of each.
+    """
+    voxel = np.concatenate([slices.voxel, filled])
+    i, j, k = np.unravel_index(voxel, (*spec.shape, spec.levels))
+    middle, reach = (k + spec.lowest) * spec.level_height, 0.499 * spec.level_height
+    z = np.concatenate([slices.height, middle[len(slices.voxel) :]])
+    slots = 1 << max(len(voxel) - 1, 1).bit_length()  # powers of two, so that few sizes are ever compiled
+    padded = np.zeros((4, slots), np.float32)
+    padded[:, : len(voxel)] = (
+        (j + 0.5) * spec.pitch,
+        (i + 0.5) * spec.pitch,
+        np.clip(z, middle - reach, middle + reach),  # a mean may lie a rounding error beyond its voxel
+        np.concatenate([slices.surface * scale, np.full(len(filled), weight)]),
+    )
+    return View(*padded)
 
 
 @partial(jax.jit, static_argnames="spec")
 def read(view, body, params, *, spec):
     """Classes and levels of one view from the grid's corner."""
     here = Pose(*(jnp.float32(0),) * 4)
-    return classify(update(empty(spec), view, here, body, params, spec, refit=False), params, spec)
-
-
-def chunks(count: int):
-    """Slices of at most AT_ONCE."""
-    return (slice(start, start + AT_ONCE) for start in range(0, count, AT_ONCE))
+    nothing = empty(spec)
+    first = update(nothing, view, here, body, params, spec, refit=False).surfaces
+    # Heights in a second look: the first has told what is a top, and what is the face below it.
+    known = replace(nothing, surfaces=jax.tree.map(lambda leaf: leaf * 1e-3, first))
+    return classify(update(known, view, here, body, params, spec, refit=False), params, spec)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -15,21 +16,22 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
-from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body
+from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, patch_sum
 from jaxbiped.mapping.params import MapParams
+from jaxbiped.mapping.relief import Relief, Surfaces, greater, is_untenable, read_relief
 
 
-@checked(numbers=("evidence", "body", "params"))
+@checked(numbers=("evidence", "surfaces", "body", "params"))
 def c_obstacles(
-    evidence: Float[Array, "H W Z"], body: Body, params: MapParams, spec: GridSpec
+    evidence: Float[Array, "H W Z"], surfaces: Surfaces, body: Body, params: MapParams, spec: GridSpec
 ) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
     """Classes (int8, `Cell`) and ground levels (int8) of all cells of one arena, from its evidence [pixels].
 
     A column's ground is its supporting surface (`ground_level`), read off the occupied voxels (`occupied_levels`); what
-    stands in the way are the solid ones (`solid_levels`). A cell is then,
-    in this order,
+    stands in the way are the solid ones (`solid_levels`). Heights of ground are those measured (`mapping.relief`). A
+    cell is then, in this order,
     - obstacle, when something solid within the body's radius stands more than one step above this cell's own ground
-      and below the squatting head;
+      and below the squatting head; or when its own ground is off its level by more than a step bears (`is_untenable`);
     - gate, when so below the standing head;
     - bump, when its ground is above level 0;
     - floor.
@@ -43,9 +45,43 @@ def c_obstacles(
     """
     check_body(body, spec)
     checks.finite("evidence", evidence)
-    columns = occupied_levels(evidence, params, spec)
-    ground = ground_level(columns, evidence, spec)
-    return read_cells(solid_levels(columns, evidence, params, spec), ground, body, params.head_margin, spec)
+    for name in ("weight", "rise"):
+        checks.finite(f"surfaces.{name}", getattr(surfaces, name))
+    evidence, surfaces = jax.lax.stop_gradient((evidence, surfaces))  # classes have none, and `kept` cannot give any
+
+    def measure():
+        columns = occupied_levels(evidence, params, spec)
+        ground = ground_level(columns, evidence, spec)
+        return columns, ground, solid_levels(columns, evidence, params, spec)
+
+    def lift(columns, ground, solid):
+        return read_relief(surfaces, ground, columns, solid, params, spec)
+
+    def read(ground, solid, relief):
+        return read_cells(solid, ground, relief, careful(body, params), params.head_margin, spec)
+
+    number = evidence[0, 0, 0]
+    columns, ground, solid = kept(measure, number)
+    relief = kept(lift, number, columns, ground, solid)
+    return kept(read, number, ground, solid, relief)
+
+
+def kept(function, number: Float[Array, ""], *arguments):
+    """The result of a function, in memory.
+
+    Without this the compiler fuses what compares a cell with its neighbours into one loop, which works everything out
+    anew for each of them, and is too long to be vectorised: ten times as slow. A barrier does not keep it from that on
+    CPUs; a loop does whose end it cannot foresee, and which is run once. `number` is any, and not NaN.
+    """
+    once = jnp.where(number > -jnp.inf, 1, 2)
+    empty = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(function, *arguments))
+    return jax.lax.fori_loop(0, once, lambda _, __: function(*arguments), empty)
+
+
+def careful(body: Body, params: MapParams) -> Body:
+    """The same robot, with what heights are measured to (`params.height_margin`) taken off what it bears."""
+    step, height = body.step_tolerance - params.height_margin, body.height_tolerance - params.height_margin
+    return replace(body, step_tolerance=step, height_tolerance=height)
 
 
 def occupied_levels(evidence: Float[Array, "H W Z"], params: MapParams, spec: GridSpec) -> UInt32[Array, "H W"]:
@@ -70,11 +106,7 @@ def solid_levels(
     a voxel, down to the first gap, `params.below_points` are enough, where that is not None.
     """
     height, width = columns.shape
-    aside = int(0.025 / spec.pitch + 1e-6)  # cells on each side that make up the patch
-    if aside:
-        padded = jnp.pad(evidence, ((aside, aside), (aside, aside), (0, 0)))
-        rows = sum(padded[i : i + height] for i in range(2 * aside + 1))
-        evidence = sum(rows[:, j : j + width] for j in range(2 * aside + 1))
+    evidence = jnp.moveaxis(patch_sum(jnp.moveaxis(evidence, -1, 0), spec), 0, -1)
     dense = columns & pack(evidence >= params.solid_points, spec)
     if params.below_points is not None:
         dense = downwards(dense, columns & pack(evidence >= params.below_points, spec))
@@ -117,19 +149,26 @@ def ground_level(columns: UInt32[Array, "H W"], evidence: Float[Array, "H W Z"],
 def read_cells(
     solid: UInt32[Array, "H W"],
     ground: Int[Array, "H W"],
+    relief: Relief,
     body: Body,
     head_margin: Float[Array, ""] | float,
     spec: GridSpec,
 ) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
-    """Classes (int8) and levels (int8) from masks of solid levels and from the ground level of each cell."""
+    """Classes (int8) and levels (int8) from masks of solid levels, and from level and relief of each cell's ground.
+
+    Ground near by that is higher than a step is told by its height; whether anything else is in the way, by its level.
+    """
     near = dilate(solid, body.radius, spec)
+    highest = dilate(relief.top, body.radius, spec, greater, -jnp.inf)
+    blocked = highest > relief.height + relief.error + body.step + body.step_tolerance
+    blocked |= is_untenable(relief, ground, body, spec)
     lower_face = (jnp.arange(32) - 0.5) * spec.level_height
     above_step = lower_face >= body.step
     squatting = near & band(above_step & (lower_face + head_margin < body.squatting), ground)
     standing = near & band(above_step & (lower_face < body.standing), ground)
     classes = jnp.where(ground > 0, Cell.BUMP, Cell.FLOOR)
     classes = jnp.where(standing != 0, Cell.GATE, classes)
-    classes = jnp.where(squatting != 0, Cell.OBSTACLE, classes)
+    classes = jnp.where((squatting != 0) | blocked, Cell.OBSTACLE, classes)
     return classes.astype(jnp.int8), ground.astype(jnp.int8)
 
 
@@ -139,27 +178,32 @@ def band(levels: Bool[Array, "32"], ground: Int[Array, "H W"]) -> UInt32[Array, 
     return bits << ground.astype(jnp.uint32)
 
 
-def dilate(columns: UInt32[Array, "H W"], radius: Float[Array, ""], spec: GridSpec) -> UInt32[Array, "H W"]:
-    """OR of the columns whose square comes nearer than `radius` [m] to a cell's centre, its own always included.
+def dilate(columns: Array, radius: Float[Array, ""], spec: GridSpec, combine=jnp.bitwise_or, nothing=0) -> Array:
+    """OR of the columns [H, W] whose square comes nearer than `radius` [m] to a cell's centre, its own always included.
 
     `radius` is traced, so all offsets up to `spec.max_radius` are visited; a larger radius is cut to that.
+
+    Args:
+      combine: what gathers them in place of OR; `nothing` is what changes nothing there.
     """
     reach = max(math.ceil(spec.max_radius / spec.pitch + 0.5) - 1, 0)
     gap = jnp.maximum(jnp.arange(reach + 1) - 0.5, 0.0) * spec.pitch
-    within = gap[:, None] ** 2 + gap[None, :] ** 2 < radius**2
-    keep = jnp.where(within, jnp.uint32(0xFFFFFFFF), jnp.uint32(0)).at[0, 0].set(0xFFFFFFFF)
+    within = (gap[:, None] ** 2 + gap[None, :] ** 2 < radius**2).at[0, 0].set(True)
     # By symmetry one quarter of the offsets decides: grow each row by every half width that some row distance needs,
-    # then OR the rows above and below.
+    # then gather the rows above and below.
     height, width = columns.shape
-    padded = jnp.pad(columns, ((0, 0), (reach, reach)))
+    nothing = jnp.asarray(nothing, columns.dtype)
+    padded = jnp.pad(columns, ((0, 0), (reach, reach)), constant_values=nothing)
     aside = [
-        padded[:, reach + k : reach + k + width] | padded[:, reach - k : reach - k + width] for k in range(reach + 1)
+        combine(padded[:, reach + k : reach + k + width], padded[:, reach - k : reach - k + width])
+        for k in range(reach + 1)
     ]
-    grown = jnp.zeros_like(columns)
+    grown = jnp.full_like(columns, nothing)
     for rows in range(reach + 1):
-        line = jnp.zeros_like(columns)
+        line = jnp.full_like(columns, nothing)
         for k in range(reach + 1):
-            line = line | (aside[k] & keep[rows, k])
-        line = jnp.pad(line, ((reach, reach), (0, 0)))
-        grown = grown | line[reach + rows : reach + rows + height] | line[reach - rows : reach - rows + height]
+            line = combine(line, jnp.where(within[rows, k], aside[k], nothing))
+        line = jnp.pad(line, ((reach, reach), (0, 0)), constant_values=nothing)
+        grown = combine(grown, line[reach + rows : reach + rows + height])
+        grown = combine(grown, line[reach - rows : reach - rows + height])
     return grown

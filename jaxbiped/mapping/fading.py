@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
@@ -46,9 +47,12 @@ def forget(
     """
     gone = missed(view, points, pose, eye.camera, eye.at, eye.image, spec) & (grid_map.evidence > 0)
     kept = jnp.where(jnp.any(gone | (points > 0), axis=-1), eye.keep, 1.0)[..., None]
+    left = jnp.where(gone, eye.keep, 1.0)
+    grounds = jnp.moveaxis(left[..., -spec.lowest : spec.ground_levels - spec.lowest], -1, 0)
     return replace(
         grid_map,
-        evidence=grid_map.evidence * jnp.where(gone, eye.keep, 1.0),
+        evidence=grid_map.evidence * left,
+        surfaces=jax.tree.map(lambda leaf: leaf * grounds, grid_map.surfaces),
         votes=grid_map.votes * kept,
         level_votes=grid_map.level_votes * kept,
     )

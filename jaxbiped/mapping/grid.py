@@ -104,6 +104,8 @@ class Body:
     standing: Float[Array, "*B"]  # [m] head height, standing
     squatting: Float[Array, "*B"]  # [m] head height, squatting
     step: Float[Array, "*B"]  # [m] greatest height of one step up or down
+    step_tolerance: Float[Array, "*B"]  # [m] what is higher than a step by more is touched
+    height_tolerance: Float[Array, "*B"]  # [m] the ground may be off the height stepped to
 
 
 def check_body(body: Body, spec: GridSpec) -> None:
@@ -113,7 +115,7 @@ def check_body(body: Body, spec: GridSpec) -> None:
       InputError: a number below 0 or not finite, or a radius beyond `GridSpec.max_radius`.
     """
     checks.finite("body.radius", body.radius, 0.0, spec.max_radius * (1 + 1e-6))  # as a float32 it may be rounded up
-    for name in ("standing", "squatting", "step"):
+    for name in ("standing", "squatting", "step", "step_tolerance", "height_tolerance"):
         checks.finite(f"body.{name}", getattr(body, name), 0.0)
 
 
@@ -130,3 +132,14 @@ def flat_index(
     for place, size in zip(places[1:], sizes[1:], strict=True):
         index = index * size + place
     return jnp.where(inside, index, 0).astype(jnp.int32)
+
+
+def patch_sum(planes: Float[Array, "K H W"], spec: GridSpec) -> Float[Array, "K H W"]:
+    """Sums over the patch of about 5 x 5 cm around each cell, at least its own; beyond the rim there is nothing."""
+    aside = int(0.025 / spec.pitch + 1e-6)  # cells on each side that make up the patch
+    if not aside:
+        return planes
+    height, width = planes.shape[1:]
+    padded = jnp.pad(planes, ((0, 0), (aside, aside), (aside, aside)))
+    rows = sum(padded[:, i : i + height] for i in range(2 * aside + 1))
+    return sum(rows[..., j : j + width] for j in range(2 * aside + 1))

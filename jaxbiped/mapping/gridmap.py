@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
@@ -16,8 +16,10 @@ from jaxbiped.mapping.fading import Eye, forget
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, flat_index
 from jaxbiped.mapping.leveling import level_view
 from jaxbiped.mapping.params import MapParams
+from jaxbiped.mapping.relief import Surfaces, add_surfaces, no_surfaces
 from jaxbiped.sensing.view import View
 
+AS_GOOD = 0.003  # [m] off its level, up to which the ground that a robot stands on is taken to be at it
 FOOTPRINT_POINTS = 20.0  # points and votes, on a cell of 5 x 5 cm, that standing on it is worth
 
 
@@ -29,6 +31,7 @@ class GridMap:
     evidence: Float[Array, "*B H W Z"]  # points in each voxel
     votes: Float[Array, "*B H W 4"]  # for floor, bump, gate and obstacle: `Cell` less one
     level_votes: Float[Array, "*B H W G"]  # for each ground level
+    surfaces: Surfaces  # how high the ground is within each of them
 
 
 @checked()
@@ -38,6 +41,7 @@ def empty(spec: GridSpec) -> GridMap:
         evidence=jnp.zeros((*spec.shape, spec.levels)),
         votes=jnp.zeros((*spec.shape, 4)),
         level_votes=jnp.zeros((*spec.shape, spec.ground_levels)),
+        surfaces=no_surfaces(spec),
     )
 
 
@@ -74,22 +78,24 @@ def update(
     """
     check_body(body, spec)
     if refit:
-        view = level_view(view, jnp.round(pose.z / spec.level_height).astype(jnp.int32), params, spec)
+        view = level_view(view, pose.z, params, spec)
         # Without this the compiler solves for the plane again at every point (a third of the time of an update).
         view = jax.lax.optimization_barrier(view)
-    points = voxelise(view, pose, params, spec)
+    index, counts = voxel_of(view, pose, params, spec)
+    points = voxelise(view, index, counts, spec)
     points = jnp.where(points >= params.voxel_points * spec.cell_share, points, 0.0)
     count = points.sum(-1)
     count = jnp.where(count >= params.view_points * spec.cell_share, count, 0.0)
     if eye is not None:
         grid_map = forget(grid_map, view, points, pose, eye, spec)
+    surfaces = add_surfaces(grid_map.surfaces, view, pose.z, index, counts, params, spec)
     evidence = grid_map.evidence + points
-    classes, levels = c_obstacles(evidence, body, params, spec)
-    return add_votes(replace(grid_map, evidence=evidence), count, classes, levels)
+    classes, levels = c_obstacles(evidence, surfaces, body, params, spec)
+    return add_votes(replace(grid_map, evidence=evidence, surfaces=surfaces), count, classes, levels)
 
 
-def voxelise(view: View, pose: Pose, params: MapParams, spec: GridSpec) -> Float[Array, "H W Z"]:
-    """Pixels of one view in each voxel: one scatter."""
+def voxel_of(view: View, pose: Pose, params: MapParams, spec: GridSpec) -> tuple[Int[Array, "N"], Bool[Array, "N"]]:
+    """Index of the voxel of each point of one view, as of a flat grid, and whether it counts; else 0."""
     (height, width), depth = spec.shape, spec.levels
     x, y = to_world(pose, view.x, view.y)
     column = jnp.floor(x / spec.pitch)
@@ -99,6 +105,12 @@ def voxelise(view: View, pose: Pose, params: MapParams, spec: GridSpec) -> Float
     counts = (view.weight > 0) & (view.weight < jnp.inf) & (view.x**2 + view.y**2 < params.max_range**2)
     counts &= (row >= 0) & (row < height) & (column >= 0) & (column < width) & (voxel >= 0) & (voxel < depth)
     index = flat_index(counts, (row, column, voxel), (height, width, depth))
+    return index, counts
+
+
+def voxelise(view: View, index: Int[Array, "N"], counts: Bool[Array, "N"], spec: GridSpec) -> Float[Array, "H W Z"]:
+    """Pixels of one view in each voxel: one scatter."""
+    (height, width), depth = spec.shape, spec.levels
     flat = jnp.zeros(height * width * depth)
     flat = flat.at[index].add(jnp.where(counts, view.weight, 0.0), mode="promise_in_bounds")
     return flat.reshape(height, width, depth)
@@ -153,28 +165,50 @@ def mark_footprint(
     grid_map: GridMap,
     x: Float[Array, ""] | float,
     y: Float[Array, ""] | float,
-    level: Int[Array, ""] | int,
+    z: Float[Array, ""] | float,
     radius: Float[Array, ""] | float,
     spec: GridSpec,
 ) -> GridMap:
-    """The map after the robot has stood at (x, y) [m] on ground of `level`: what it stands on is known ground.
+    """The map after the robot has stood at (x, y) [m] on ground of height `z` [m]: what it stands on is known ground.
 
-    Cells whose centre lies within `radius` [m], and the one that holds the point, get `FOOTPRINT_POINTS` of evidence
-    at that level, and as many votes: for floor at level 0, else for bump. A place that is not finite, or outside the
-    grid, marks nothing beyond the rim. Under `jit` a level that is no ground level counts as the nearest that is.
+    Cells whose centre lies within `radius` [m], and the one that holds the point, get `FOOTPRINT_POINTS` of evidence at
+    that height, and as many votes: for floor at level 0, else for bump. A place that is not finite, or outside the
+    grid, marks nothing beyond the rim. Under `jit` a height that is not finite counts as 0, and one above the highest
+    ground level as of that level.
 
     Raises:
-      InputError: an argument of another rank, shape or type, a level or a radius out of range, NaN in `grid_map`.
+      InputError: an argument of another rank, shape or type, a height that is not finite, a radius out of range, NaN in
+        `grid_map`.
     """
-    checks.integers("level", level, between=(0, spec.ground_levels - 1))
+    checks.finite("z", z)
     checks.finite("radius", radius, 0.0)
     rows, columns = (jnp.arange(n) for n in spec.shape)
     dx, dy = (columns + 0.5) * spec.pitch - x, ((rows + 0.5) * spec.pitch - y)[:, None]
     own = jnp.maximum(jnp.abs(dx), jnp.abs(dy)) <= spec.pitch / 2
     here = own | (dx**2 + dy**2 <= jnp.square(radius))
     count = jnp.where(here, FOOTPRINT_POINTS * spec.cell_share, 0.0)
-    level = jnp.clip(jnp.asarray(level), 0, spec.ground_levels - 1).astype(jnp.int8)
+    z = jnp.asarray(z, jnp.float32)
+    z = jnp.where(jnp.isfinite(z), z, 0.0)
+    level = jnp.clip(jnp.round(z / spec.level_height), 0, spec.ground_levels - 1).astype(jnp.int8)
+    on_level = jnp.where(jnp.arange(spec.ground_levels)[:, None, None] == level, count, 0.0)
+    surfaces = Surfaces(
+        grid_map.surfaces.weight + on_level,
+        grid_map.surfaces.rise + on_level * (z - level * jnp.float32(spec.level_height)),
+    )
     at_level = jnp.arange(spec.levels) + spec.lowest == level
-    marked = replace(grid_map, evidence=grid_map.evidence + jnp.where(at_level, count[..., None], 0.0))
+    evidence = grid_map.evidence + jnp.where(at_level, count[..., None], 0.0)
+    marked = replace(grid_map, evidence=evidence, surfaces=surfaces)
     classes = jnp.where(level > 0, Cell.BUMP, Cell.FLOOR).astype(jnp.int8)
     return add_votes(marked, count, jnp.broadcast_to(classes, spec.shape), jnp.broadcast_to(level, spec.shape))
+
+
+def ground_height(grid_map: GridMap, ij: Int[Array, "2"], z: Float[Array, ""], spec: GridSpec) -> Float[Array, ""]:
+    """Height [m] of the ground of a cell, as it was measured, at the level that `z` [m] is nearest to.
+
+    It is `z` itself where nothing was measured there, and the height of the level where it is as good as that.
+    """
+    level = jnp.clip(jnp.round(z / spec.level_height), 0, spec.ground_levels - 1).astype(jnp.int32)
+    weight, rise = (leaf[level, ij[0], ij[1]] for leaf in (grid_map.surfaces.weight, grid_map.surfaces.rise))
+    off = rise / jnp.maximum(weight, 1e-6)
+    off = jnp.where(jnp.abs(off) > AS_GOOD, off, 0.0)
+    return jnp.where(weight > 0, level * spec.level_height + off, z)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float
 
 from jaxbiped.core.signatures import checked
 from jaxbiped.mapping.grid import GridSpec
@@ -16,24 +17,31 @@ from jaxbiped.mapping.params import MapParams
 from jaxbiped.sensing.view import View
 
 # Rounds of the fit: points up to this range [m], and residuals up to this multiple of `refit_inlier`. Near points come
-# first: one degree of tilt is more than half a level at 1 m, and only 5 mm at 0.3 m.
-ROUNDS = ((0.3, 1.9), (0.45, 1.7), (0.75, 1.4), (1.2, 1.0))
+# first: one degree of tilt is more than half a level at 1 m, and only 5 mm at 0.3 m. Each round is wide enough for what
+# tilt the one before has left.
+ROUNDS = ((0.3, 1.2), (0.3, 1.0), (0.45, 1.0), (0.75, 1.0), (0.9, 1.0), (1.2, 1.0))
 # What is known before the fit, as one observation of PRIOR_PIXELS pixels (a matcher's pixels are correlated): the plane
 # passes within 1 cm under the robot, sloped by less than 1.5 degrees, and a pixel is good to 4 mm.
 PRIOR_PIXELS, PRIOR_OFFSET, PRIOR_SLOPE, PIXEL_SD = 50.0, 0.01, 0.026, 0.004
+# Ground need not lie at a level: what is nearest to one level, or to the middle between two, lies off it by about
+# OFF_LEVEL, and is told from an error of the plane because the robot knows how high it stands, to OWN_HEIGHT. What
+# comes out as less than PLAIN is noise.
+OFF_LEVEL, OWN_HEIGHT, PLAIN = 0.010, 0.003, 0.0015  # [m]
 SAMPLE = 1000  # points that the fit is made of, at least where a view has as many
+
+Scalar = Float[Array, ""]
 
 
 @checked(numbers=("params",))
-def level_view(view: View, support: Int[Array, ""] | int, params: MapParams, spec: GridSpec) -> View:
+def level_view(view: View, support: Scalar | float, params: MapParams, spec: GridSpec) -> View:
     """One view brought level by the floor that it sees: turned about the robot's foot, so that the floor lies flat.
 
-    Fits z = a + b x + c y, in the robot's frame, to points that may lie on any level that a robot may stand on, seen
-    from one of level `support` (so that the base floor may lie at -3 or -6 cm): each round snaps residuals to the
-    nearest of these levels and solves one reweighted least squares (Tukey's biweight, pixel weights, a weak prior).
-    About a thousand points take part, every n-th of the view. The refit is refused, and the view returned as it was,
-    when the plane's slope or height reaches `params.refit_slope` or `params.refit_offset`, or fewer than
-    `params.refit_points` pixels lie on it.
+    Fits z = a + b x + c y, in the robot's frame, to points that may lie at any height that a robot may stand on, seen
+    from `support` [m], the height of what the robot stands on. Each round gives every point to the nearest half level,
+    finds how far the ground there lies off that (a bump of 4 cm must neither lift nor tilt the floor), and solves one
+    reweighted least squares (Tukey's biweight, pixel weights, a weak prior). About a thousand points take
+    part, every n-th of the view. The refit is refused, and the view returned as it was, when the plane's slope or
+    height reaches `params.refit_slope` or `params.refit_offset`, or fewer than `params.refit_points` pixels lie on it.
 
     Points with weight 0, and points that are not finite, take no part. Deviation: the paper does not refit.
 
@@ -50,9 +58,7 @@ def level_view(view: View, support: Int[Array, ""] | int, params: MapParams, spe
     )
 
 
-def fit_floor(
-    view: View, support: Float[Array, ""], params: MapParams, spec: GridSpec
-) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
+def fit_floor(view: View, support: Scalar, params: MapParams, spec: GridSpec) -> tuple[Scalar, Scalar, Scalar]:
     """The plane (a [m], b, c) of `level_view`; zeros where it is refused."""
     stride = max(1, view.x.shape[-1] // SAMPLE) | 1  # odd, so that it does not run down a column of an image
     x, y, z, pixels = (v[::stride] for v in (view.x, view.y, view.z, view.weight))
@@ -60,21 +66,27 @@ def fit_floor(
     x, y, z = (jnp.where(known, v, 0.0) for v in (x, y, z))
     pixels = jnp.where(known, pixels * stride, 0.0)
     range_squared = x * x + y * y
+    rise, count = spec.level_height / 2, 2 * spec.ground_levels - 1
 
-    def off_level(plane):
-        """Height [m] of each point over the nearest level that can be ground, and that level's height."""
+    def off_level(plane, lifts):
+        """Half level that each point is nearest to, and its height [m] over the ground there."""
         above = z - (plane[0] + plane[1] * x + plane[2] * y)
-        level = jnp.clip(jnp.round(above / spec.level_height), -support, spec.ground_levels - 1 - support)
-        return above - level * spec.level_height, level * spec.level_height
+        level = jnp.clip(jnp.round((above + support) / rise), 0, count - 1)
+        lift = sum(jnp.where(level == k, lifts[k], 0.0) for k in range(count))
+        return level, above - (level * rise - support) - lift
 
-    plane = (jnp.float32(0),) * 3
+    plane, lifts = (jnp.float32(0),) * 3, (jnp.float32(0),) * count
     for reach, width in ROUNDS:
-        residual, level = off_level(plane)
+        level, residual = off_level(plane, lifts)
         near = jnp.where(range_squared < reach**2, pixels, 0.0)
         weight = near * jnp.maximum(1 - (residual / (width * params.refit_inlier)) ** 2, 0.0) ** 2
-        plane = solve_plane(x, y, z - level, weight)
+        above = z - (level * rise - support)
+        features = jnp.stack([jnp.ones_like(x), x, y, above, x * x, x * y, y * y, x * above, y * above])
+        weights = jnp.where(level == jnp.arange(count)[:, None], weight, 0.0)
+        # One product for all sums: as reductions, each of them works the weights out anew.
+        plane, lifts = solve_ground(jax.lax.dot_general(weights, features, (((1,), (1,)), ((), ()))))
 
-    residual, _ = off_level(plane)
+    _, residual = off_level(plane, lifts)
     on_floor = (jnp.abs(residual) < params.refit_inlier) & (range_squared < ROUNDS[-1][0] ** 2)
     accept = (
         (jnp.hypot(plane[1], plane[2]) < params.refit_slope)
@@ -84,18 +96,51 @@ def fit_floor(
     return tuple(jnp.where(accept, number, 0.0) for number in plane)
 
 
+def solve_ground(sums: Float[Array, "K 9"]) -> tuple[tuple[Scalar, Scalar, Scalar], tuple[Scalar, ...]]:
+    """(a, b, c) of z = a + b x + c y + lift, and the lift [m] of each half level's ground: least squares with priors.
+
+    The lifts are eliminated, solved for, and, where they are no more than noise, taken for none; the plane is then that
+    of what is left.
+
+    Args:
+      sums: of the weights of each half level's points, times 1, x, y, z, xx, xy, yy, xz and yz; z over the half level.
+    """
+    n, nx, ny, nz, xx, xy, yy, xz, yz = sums.T
+    first, second = (n.sum(), nx.sum(), ny.sum()), (xx.sum(), xy.sum(), yy.sum())
+    right = nz.sum(), xz.sum(), yz.sum()
+    share = 1 / (n + PRIOR_PIXELS * (PIXEL_SD / OFF_LEVEL) ** 2)
+    a, b, c = solve_plane(
+        tuple(total - (n * part * share).sum() for total, part in zip(first, (n, nx, ny), strict=True)),
+        (
+            second[0] - (nx * nx * share).sum(),
+            second[1] - (nx * ny * share).sum(),
+            second[2] - (ny * ny * share).sum(),
+        ),
+        tuple(total - (nz * part * share).sum() for total, part in zip(right, (n, nx, ny), strict=True)),
+        OWN_HEIGHT,
+    )
+    lifts = (nz - a * n - b * nx - c * ny) * share
+    lifts = jnp.where(jnp.abs(lifts) > PLAIN, lifts, 0.0)
+    left = tuple(total - (lifts * part).sum() for total, part in zip(right, (n, nx, ny), strict=True))
+    return solve_plane(first, second, left, PRIOR_OFFSET), tuple(lifts)
+
+
 def solve_plane(
-    x: Float[Array, "N"], y: Float[Array, "N"], z: Float[Array, "N"], weight: Float[Array, "N"]
-) -> tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]:
-    """(a, b, c) of z = a + b x + c y by weighted least squares with the prior, in closed form.
+    first: tuple[Scalar, Scalar, Scalar],
+    second: tuple[Scalar, Scalar, Scalar],
+    right: tuple[Scalar, Scalar, Scalar],
+    offset: float,
+) -> tuple[Scalar, Scalar, Scalar]:
+    """(a, b, c) of z = a + b x + c y from weighted sums, with the prior that a is within `offset` [m], in closed form.
 
     Plain sums and Cramer's rule: small matrix products and a library's solve would be called once for each arena.
+
+    Args:
+      first: of 1, x, y; `second` of xx, xy, yy; `right` of z, xz, yz.
     """
-    wx, wy, wz = weight * x, weight * y, weight * z
-    prior = PRIOR_PIXELS * (PIXEL_SD / PRIOR_OFFSET) ** 2, PRIOR_PIXELS * (PIXEL_SD / PRIOR_SLOPE) ** 2
-    n, nx, ny = jnp.sum(weight) + prior[0], jnp.sum(wx), jnp.sum(wy)
-    xx, xy, yy = jnp.sum(wx * x) + prior[1], jnp.sum(wx * y), jnp.sum(wy * y) + prior[1]
-    zn, zx, zy = jnp.sum(wz), jnp.sum(wz * x), jnp.sum(wz * y)
+    (n, nx, ny), (xx, xy, yy), (zn, zx, zy) = first, second, right
+    slope = PRIOR_PIXELS * (PIXEL_SD / PRIOR_SLOPE) ** 2
+    n, xx, yy = n + PRIOR_PIXELS * (PIXEL_SD / offset) ** 2, xx + slope, yy + slope
     # Cofactors of the symmetric 3 x 3 matrix [[n, nx, ny], [nx, xx, xy], [ny, xy, yy]].
     nn_, nx_, ny_ = xx * yy - xy * xy, ny * xy - nx * yy, nx * xy - ny * xx
     xx_, xy_, yy_ = n * yy - ny * ny, nx * ny - n * xy, n * xx - nx * nx

@@ -47,6 +47,14 @@ class MapConfig(Model):
     """[m] a point this near to a level of the fitted floor lies on it"""
     refit_points: float = Field(400.0, ge=0)
     """pixels that must lie on the fitted floor; fewer, and the view stays as it is"""
+    height_sd: float = Field(0.011, ge=0)
+    """[m] to which one pixel at the robot's feet tells the height of a surface; n pixels, to a root of n less. What may
+    be such an error does not make ground too high, or too low, to be stepped on"""
+    height_range: float = Field(0.365, gt=0)
+    """[m] distance at which that error is a root of 2 greater; further off it grows in proportion. The camera's
+    height: a point's error in depth grows as its distance squared, and the part of it that is height falls"""
+    height_margin: float = Field(0.0015, ge=0)
+    """[m] to which heights are measured at best: ground this near to what the robot does not bear is taken for it"""
     fade: float | None = Field(None, gt=0)
     """[s] after which what a view tells otherwise counts 1/e, for obstacles that move; by default nothing fades"""
 
@@ -72,5 +80,8 @@ class MapParams:
     refit_offset: Float[Array, ""]
     refit_inlier: Float[Array, ""]
     refit_points: Float[Array, ""]
+    height_sd: Float[Array, ""]
+    height_range: Float[Array, ""]
+    height_margin: Float[Array, ""]
     fade: Float[Array, ""]
     below_points: Float[Array, ""] | None = None  # None: the rule is left out of the program

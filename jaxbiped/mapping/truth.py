@@ -10,6 +10,7 @@ from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.boxes import Boxes, covers, ground_height
 from jaxbiped.mapping.cobstacles import read_cells
 from jaxbiped.mapping.grid import Body, GridSpec, check_body
+from jaxbiped.mapping.relief import Relief
 
 SAMPLES = 5  # a cell is sampled at 5 x 5 places
 LEAST_SHARE = 0.05  # a level is occupied in a cell when something stands there in over this share of its places
@@ -21,8 +22,9 @@ def truth_grid(arena: Arena, spec: GridSpec, body: Body) -> tuple[Int[Array, "H 
 
     Each cell is sampled at 5 x 5 places. A level is occupied where over 5 % of them hold a box at that level; the
     ground is the level of most places (a tie goes to the higher one), and level 0 where most are too high to stand on.
-    A box fills the levels from that of its bottom (the floor, for one that stands) to that of its top. No cell is
-    unmeasured. A box of which a number is NaN stands nowhere.
+    A box fills the levels from that of its bottom (the floor, for one that stands) to that of its top. Heights are
+    exact: the mean of the places at the ground's level, and, of what is near, the highest at an occupied level. No cell
+    is unmeasured. A box of which a number is NaN stands nowhere.
 
     Raises:
       InputError: an argument of another rank, shape or type, or a body that `grid.check_body` refuses.
@@ -42,11 +44,28 @@ def truth_grid(arena: Arena, spec: GridSpec, body: Body) -> tuple[Int[Array, "H 
     bits = jnp.arange(levels, dtype=jnp.uint32)
     occupied = share((solid[..., None] >> bits) & 1) > LEAST_SHARE
     columns = jnp.sum(jnp.where(occupied, jnp.uint32(1) << bits, 0), axis=-1, dtype=jnp.uint32)
-    ground = jnp.round(ground_height(arena.boxes, x, y) / spec.level_height).astype(jnp.int32)
-    walkable = share(ground[..., None] == jnp.arange(spec.ground_levels))
+    heights = ground_height(arena.boxes, x, y)
+    level = jnp.round(heights / spec.level_height).astype(jnp.int32)
+    at_level = level[..., None] == jnp.arange(spec.ground_levels)
+    walkable = share(at_level)
     best = spec.ground_levels - 1 - jnp.argmax(walkable[..., ::-1], axis=-1)
     ground = jnp.where(walkable.sum(-1) >= 0.5, best, 0)
-    return read_cells(columns, ground, body, 0.0, spec)
+    relief = exact_relief(jnp.where(at_level, heights[..., None], -jnp.inf), walkable, ground, spec)
+    return read_cells(columns, ground, relief, body, 0.0, spec)
+
+
+def exact_relief(
+    heights: Float[Array, "Y X G"], shares: Float[Array, "H W G"], ground: Int[Array, "H W"], spec: GridSpec
+) -> Relief:
+    """The relief of known ground: heights [m] of all places at each level (else -inf), and their shares of a cell."""
+    (height, width), n = spec.shape, SAMPLES
+    cells = heights.reshape(height, n, width, n, spec.ground_levels)
+    total = jnp.where(cells > -jnp.inf, cells, 0.0).sum((1, 3))
+    mean = total / jnp.maximum(shares * n**2, 1.0)
+    own = jnp.take_along_axis(mean, ground[..., None], axis=-1)[..., 0]
+    known = jnp.take_along_axis(shares, ground[..., None], axis=-1)[..., 0] > 0
+    top = jnp.where(shares > LEAST_SHARE, cells.max((1, 3)), -jnp.inf).max(-1)
+    return Relief(jnp.where(known, own, ground * spec.level_height), jnp.zeros(ground.shape), top)
 
 
 def filled_levels(boxes: Boxes, x: Float[Array, "Y X"], y: Float[Array, "Y X"], spec: GridSpec) -> UInt32[Array, "Y X"]:

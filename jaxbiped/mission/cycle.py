@@ -11,7 +11,7 @@ from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.movers import at_time, only
-from jaxbiped.geometry.pose import Pose, wrap_angle
+from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.mission.decision import Thought, climbed, decide
 from jaxbiped.mission.encounter import met
 from jaxbiped.mission.executors import EXECUTORS, Execution
@@ -90,7 +90,7 @@ def think(
     # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
     view, sightings = jax.lax.optimization_barrier(seen)
     if program.sensor == "oracle":
-        mind = replace(mind, belief=replace(mind.belief, pose=on_level(world.pose, program)))
+        mind = replace(mind, belief=replace(mind.belief, pose=world.pose))
     return view, *decide(mind, view, sightings, arena, settings, program)
 
 
@@ -117,11 +117,6 @@ def sense(
     return view, landmarks.sight(
         arena, pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
     )
-
-
-def on_level(pose: Pose, program: Program) -> Pose:
-    """A true pose as the robot would hold it: its height a whole level."""
-    return replace(pose, z=jnp.round(pose.z / program.spec.level_height) * program.spec.level_height)
 
 
 def conclude(

@@ -97,7 +97,7 @@ def begin_maps(mind: Mind, settings: Settings, spec: GridSpec) -> Mind:
     def begin(n, grid_map):
         k = fresh[n]
         first = mapping.mark_footprint(
-            mapping.empty(spec), pose.x[k], pose.y[k], level_of(pose.z[k], spec), settings.limits.body_radius[k], spec
+            mapping.empty(spec), pose.x[k], pose.y[k], pose.z[k], settings.limits.body_radius[k], spec
         )
         return jax.tree.map(lambda maps, new: maps.at[k].set(new), grid_map, first)
 
@@ -114,13 +114,19 @@ def level_of(z: Float[Array, ""], spec: GridSpec) -> Int[Array, ""]:
 def read_map(
     mind: Mind, view: View, settings: Settings, program: Program
 ) -> tuple[Mind, Int[Array, "H W"], Int[Array, "H W"], Int[Array, "2"]]:
-    """One robot with one more view: its mind, the classed map, and its cell."""
+    """One robot with one more view: its mind, the classed map, and its cell.
+
+    Heights are counted, level by level; what its ground is off a level was measured before it stepped there.
+    """
     spec, pose = program.spec, mind.belief.pose
-    tilted = program.sensor != "oracle"  # whose points have no attitude error to take out
+    ij = cell_of(pose.x, pose.y, spec)
+    tilted = program.sensor != "oracle"  # whose points have no attitude error to take out, and which knows its pose
+    if tilted:
+        pose = replace(pose, z=mapping.ground_height(mind.grid_map, ij, pose.z, spec))
+        mind = replace(mind, belief=replace(mind.belief, pose=pose))
     eye = eye_of(mind, settings, program) if program.fading else None
     grid_map = mapping.update(mind.grid_map, view, pose, settings.body, settings.mapping, spec, tilted, eye)
     classes, levels = mapping.classify(grid_map, settings.mapping, spec)
-    ij = cell_of(pose.x, pose.y, spec)
     # Where the robot stands it can stand, on the level that it stands on, whatever the map makes of it.
     level = level_of(pose.z, spec)
     own = classes[ij[0], ij[1]]
@@ -190,5 +196,5 @@ def nearest_direction(yaw: Float[Array, ""]) -> Int[Array, ""]:
 
 
 def climbed(pose: Pose, rise: Int[Array, ""], spec: GridSpec) -> Pose:
-    """The believed pose after a step of `rise` levels: heights are counted, not measured."""
+    """The believed pose after a step of `rise` levels."""
     return replace(pose, z=pose.z + rise * spec.level_height)

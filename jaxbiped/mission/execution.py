@@ -13,9 +13,10 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.settings import Settings
 from jaxbiped.mission.state import World
 from jaxbiped.motion.primitives import Command
+from jaxbiped.motion.robot import STEP_TOLERANCE
 
 CHECKS = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
-TOUCH = 0.002  # [m] contact that counts as none: rounding, and boxes that just end at a height
+TOUCH = STEP_TOLERANCE  # [m] contact that counts as none: rounding, and boxes that just end at a height
 ODOMETRY = 2  # channel of a mission's seed
 PLAY = 3  # channel of a mission's seed
 

@@ -52,8 +52,7 @@ def by_motion(mind: Mind, sightings: Sightings) -> Belief:
 def by_walls(mind: Mind, view: View, settings: Settings, program: Program) -> Mind:
     """The mind after the walls in view were laid onto those measured before, and were kept with them."""
     spec, image = program.spec, program.image
-    support = jnp.round(mind.belief.pose.z / spec.level_height).astype(jnp.int32)
-    flat = jax.lax.optimization_barrier(level_view(view, support, settings.mapping, spec))
+    flat = jax.lax.optimization_barrier(level_view(view, mind.belief.pose.z, settings.mapping, spec))
     shape, step = picture_shape(view.x.shape[-1], image.width, image.height)
     walls = find_walls(flat, shape, step, mind.belief.pose.z)
     belief = match(mind.belief, walls, mind.outlines, spec)

@@ -47,7 +47,7 @@ def as_mapped(
     spec, mapping = program.spec, settings.mapping
     view, evidence, pose = jax.tree.map(lambda leaf: leaf[0], (thought.view, thought.evidence, thought.pose))
     if program.sensor != "oracle":
-        view = level_view(view, jnp.round(pose.z / spec.level_height).astype(jnp.int32), mapping, spec)
+        view = level_view(view, pose.z, mapping, spec)
     points = jnp.stack([*to_world(pose, view.x, view.y), view.z + pose.z], axis=-1)
     counts = (view.weight > 0) & (view.x**2 + view.y**2 < mapping.max_range**2) & jnp.all(jnp.isfinite(points), axis=-1)
     bits = jnp.arange(spec.levels + spec.lowest, dtype=jnp.uint32)

@@ -19,7 +19,7 @@ from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.library import Library, load_library
 from jaxbiped.mission.strategies import Strategy, strategy
 from jaxbiped.motion.primitives import DurationConfig, Durations
-from jaxbiped.motion.robot import Footing, RobotConfig
+from jaxbiped.motion.robot import HEIGHT_TOLERANCE, Footing, RobotConfig
 from jaxbiped.planning import Costs
 from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
 from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
@@ -71,7 +71,7 @@ class LimitConfig(Model):
     """Measurements in a row that show no path, each a quarter turn on, after which the robot gives up: once around."""
     edge_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.02
     """[m] that an edge may lie off under the robot before it falls; simulated bipeds fell from 0.025 on."""
-    height_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.010
+    height_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = HEIGHT_TOLERANCE
     """[m] that the ground may be off the height stepped to; simulated bipeds took -12 to +8 mm."""
     start_sd: tuple[float, float] = (0.002, 0.005)
     """[m, rad] how well the robot knows where it starts."""
@@ -125,6 +125,11 @@ class MissionConfig(Model):
         if isinstance(data, dict) and data.get("executor", "kinematic") != "kinematic":
             robot = data.get("robot", {})
             data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
+        if isinstance(data, dict):
+            limits, robot = data.get("limits", {}), data.get("robot", {})
+            bears = limits.get("height_tolerance") if isinstance(limits, dict) else limits.height_tolerance
+            if isinstance(robot, dict) and bears is not None:
+                data = data | {"robot": {"height_tolerance": bears} | robot}
         if isinstance(data, dict) and data.get("sensor") == "stereo":
             rules = data.get("mapping", {})
             data = data | {"mapping": {"below_points": BELOW_POINTS} | rules if isinstance(rules, dict) else rules}

@@ -69,7 +69,7 @@ class Anchor:
 class Mind:
     """The robot's side. The stance is known to both."""
 
-    belief: Belief  # pose and its covariance; pose.z is the height of the level that it stands on
+    belief: Belief  # pose and its covariance; pose.z is the height of the ground that it stands on
     grid_map: GridMap
     squat: Bool[Array, "*B"]
     look: Bool[Array, "*B"]  # the next measurement looks down before the feet
@@ -96,8 +96,7 @@ def start(
     visual = localisation in VISUAL
     none = jnp.zeros(())
     world = World(pose, no, none, none, zero, zero, code, seed, none, none, before=pose if visual else None)
-    level = jnp.round(pose.z / spec.level_height)
-    belief = Belief(Pose(x, y, level * spec.level_height, yaw), jnp.diag(settings.limits.start_variance))
+    belief = Belief(pose, jnp.diag(settings.limits.start_variance))
     outlines = no_outlines(spec) if localisation in ICP else None
     anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None
     return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown(), none, anchor, outlines)

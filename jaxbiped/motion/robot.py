@@ -14,6 +14,9 @@ from jaxbiped.config import Model
 from jaxbiped.mapping.grid import Body
 
 Length = Annotated[float, pydantic.Field(gt=0.0, le=2.0)]
+Tolerance = Annotated[float, pydantic.Field(ge=0.0, le=0.1)]
+
+HEIGHT_TOLERANCE, STEP_TOLERANCE = 0.010, 0.002  # [m] defaults of the fields below, and of the executor's own rules
 
 
 class FootingConfig(Model):
@@ -77,6 +80,11 @@ class RobotConfig(Model):
     """[m] head height, squatting."""
     step: Annotated[float, pydantic.Field(gt=0.0, le=0.1)] = 0.03
     """[m] greatest height of one step up or down."""
+    height_tolerance: Tolerance = HEIGHT_TOLERANCE
+    """[m] that ground may be off the height that is stepped to: the map takes ground further off its level for an
+    obstacle. In missions that of the executor (`limits.height_tolerance`), by default."""
+    step_tolerance: Tolerance = STEP_TOLERANCE
+    """[m] that ground may be higher than a step: the map takes what is higher for an obstacle."""
     footing: FootingConfig = FootingConfig()
     """Where its feet want to be before an edge; read where footing counts (simulated bipeds)."""
 
@@ -90,4 +98,4 @@ class RobotConfig(Model):
 
     def body(self) -> Body:
         """What the map needs of it, traced."""
-        return Body(*(jnp.float32(v) for v in (self.radius, self.standing, self.squatting, self.step)))
+        return Body(**{field.name: jnp.float32(getattr(self, field.name)) for field in fields(Body)})

@@ -34,8 +34,8 @@ def measure(
     """Points of one whole arena in the robot frame of the true `pose`; all arguments after it are static.
 
     On a lattice of `spacing` [m] over the area `size_xy` [m] there is in each column one point on the ground, and one
-    in each level that a box fills at least in part. Columns are centres of squares, so that none lies on the edge of
-    a cell of a pitch that `spacing` divides.
+    in each other level that a box fills at least in part. Columns are centres of squares, so that none lies on the edge
+    of a cell of a pitch that `spacing` divides.
 
     Args:
       level_height: [m] between the points inside boxes; level l is about l times that.
@@ -60,7 +60,7 @@ def measure(
     ground, ceiling, cover = heights(arena.boxes, x, y)
     level = (np.arange(levels, dtype=np.float32) * np.float32(level_height))[:, None]
     half = level_height / 2
-    inside_floor = level < ground  # the ground itself has a point of its own
+    inside_floor = level < ground - half  # the ground itself has a point of its own, and is alone in its level
     inside_overhead = (level + half > ceiling) & (level - half <= cover)
     # A level that a box fills in part is measured where the box begins or ends.
     height = jnp.where(inside_floor, level, jnp.clip(level, ceiling, jnp.maximum(ceiling, cover)))

@@ -6,8 +6,9 @@ import jax
 import numpy as np
 import pytest
 
-from jaxbiped.arenas import FAMILIES, SceneConfig, load_scene, sample, to_arena
+from jaxbiped.arenas import FAMILIES, SceneConfig, load_scene, sample, scene_warnings, to_arena
 from jaxbiped.errors import InputError
+from jaxbiped.motion.robot import RobotConfig
 
 FOLDER = Path(__file__).parents[2] / "configs" / "scenes"
 GOOD = """
@@ -146,6 +147,48 @@ def test_missing_file_and_folder(tmp_path):
         with pytest.raises(InputError) as caught:
             load_scene(path)
         assert str(path) in str(caught.value)
+
+
+def warned(*boxes, start=(0.4, 0.7, 0.0), **robot):
+    scene = SceneConfig(name="a", start=start, goal=(1.4, 0.7), boxes=boxes)
+    return scene_warnings(to_arena(scene), RobotConfig(**robot), level_height=0.03)
+
+
+def box(top, x=0.9, size=(0.2, 0.2), **fields):
+    return {"centre": (x, 0.7), "size": size, "top": top} | fields
+
+
+@pytest.mark.parametrize("top", [0.033, 0.04, 0.044])
+def test_a_box_between_a_step_and_an_obstacle_is_warned_of(top):
+    (text,) = warned(box(0.5), box(top))
+    assert text == (
+        f"boxes.1.top: is {top:g} m high, more than this robot's step of 0.03 m and less than the 0.045 m from which "
+        f"it is an obstacle by its level (got {top:g})"
+    )
+
+
+def test_steps_obstacles_and_what_hangs_are_not_warned_of():
+    assert warned(box(0.02), box(0.03), box(0.032), box(0.045), box(0.5), box(0.41, bottom=0.37)) == ()
+    assert warned(box(0.03, size=(0.6, 0.6)), box(0.06)) == ()  # stairs
+    assert warned(box(0.04), step=0.04) == () and warned(box(0.044), step=0.04) != ()
+    (text,) = warned(box(0.03, size=(0.6, 0.6)), box(0.07))  # a stair of 4 cm
+    assert text.startswith("boxes.1.top: is 0.04 m high, more than") and text.endswith("(got 0.07)")
+
+
+def test_a_start_in_an_obstacle_of_this_robot_is_warned_of():
+    """The box is 0.1 m off: none to the robot of the paper, which `load_scene` goes by."""
+    block = box(0.3, x=0.6)
+    assert warned(block) == ()
+    (text,) = warned(block, body_radius=0.12, radius=0.12)
+    assert text == "start: this robot, 0.12 m in radius, starts in boxes.0 (at [0.4, 0.7])"
+    low = box(0.5, x=0.4, bottom=0.4)
+    assert warned(low) == () and warned(low, standing=0.45)[0].startswith("start: this robot")
+    assert warned(box(0.03, x=0.55), step=0.02)[0].startswith("start: this robot")
+
+
+def test_the_papers_scenes_are_not_warned_of():
+    for path in sorted(FOLDER.glob("*.toml")):
+        assert scene_warnings(load_scene(path)[1], RobotConfig(), level_height=0.03) == (), path.name
 
 
 def test_families_are_named():

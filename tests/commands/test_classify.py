@@ -24,9 +24,8 @@ from jaxbiped.sensing.cloud import save_ply
 PLACES = {(0.3, 0.3): Cell.FLOOR, (0.9, 0.8): Cell.BUMP, (1.5, 0.5): Cell.OBSTACLE, (1.475, 1.2): Cell.GATE}
 
 
-def room(noise=0.001, spacing=0.008):
-    """A floor of 2 x 1.6 m with a bump of 3 cm at x = 0.8 to 1, a low wall at y < 0.8 and a lintel at y > 0.9."""
-    rng = np.random.default_rng(0)
+def faces(rng, spacing):
+    """A function that samples points [n, 3] of an upright or level rectangle from `low` to `high`."""
 
     def face(low, high):
         low, high = np.array(low, float), np.array(high, float)
@@ -34,6 +33,13 @@ def room(noise=0.001, spacing=0.008):
         area = np.prod(np.delete(high - low, flat))
         return rng.uniform(low, high, (int(area / spacing**2), 3))
 
+    return face
+
+
+def room(noise=0.001, spacing=0.008):
+    """A floor of 2 x 1.6 m with a bump of 3 cm at x = 0.8 to 1, a low wall at y < 0.8 and a lintel at y > 0.9."""
+    rng = np.random.default_rng(0)
+    face = faces(rng, spacing)
     floor = face((0, 0, 0), (2, 1.6, 0))
     floor[(floor[:, 0] > 0.8) & (floor[:, 0] < 1), 2] = 0.03
     wall = [face((x, 0, 0), (x, 0.8, 0.3)) for x in (1.45, 1.55)] + [face((1.45, 0, 0.3), (1.55, 0.8, 0.3))]
@@ -76,6 +82,68 @@ def test_a_room(tmp_path, capsys):
     words = ["plan", str(tmp_path / "out" / "classes.npz"), "--start", "0.3", "0.3", "--goal", "1.8", "1.2"]
     assert cli.main([*words, "--out", str(tmp_path / "p")]) == 0
     assert "gate" in (tmp_path / "p" / "path.csv").read_text()  # through it: the wall bars the other way
+
+
+def floor_with(high, sides=False, floor_below=False, low=0.0):
+    """A floor of 2 x 1.6 m and a flat surface of 0.6 x 0.5 m, `high` above it; its four sides down to `low`."""
+    rng = np.random.default_rng(1)
+    face, (x0, x1, y0, y1) = faces(rng, 0.008), (0.72, 1.32, 0.53, 1.03)
+    floor = face((0, 0, 0), (2, 1.6, 0))
+    under = (floor[:, 0] > x0) & (floor[:, 0] < x1) & (floor[:, 1] > y0) & (floor[:, 1] < y1)
+    parts = [floor if floor_below else floor[~under], face((x0, y0, high), (x1, y1, high))]
+    if sides:
+        parts += [face((x, y0, low), (x, y1, high)) for x in (x0, x1)]
+        parts += [face((x0, y, low), (x1, y, high)) for y in (y0, y1)]
+    points = np.concatenate(parts)
+    return points + 0.001 * rng.normal(size=points.shape)
+
+
+MIDDLE, EDGE, BESIDE, AWAY = (1.02, 0.78), (0.76, 0.78), (0.66, 0.78), (0.4, 0.78)
+
+
+def classes_at(grid, *places):
+    return [int(grid.classes[grid.cell_at(xy)]) for xy in places]
+
+
+@pytest.mark.parametrize("pitch", [0.05, 0.02])
+@pytest.mark.parametrize("sides", [True, False], ids=["with sides", "seen from above"])
+@pytest.mark.parametrize("high", [0.12, 0.36, 0.40, 0.43, 0.6, 1.5])
+def test_a_block_is_an_obstacle_however_high_its_flat_top(tmp_path, high, sides, pitch):
+    """Whether its top lies where a squatting head has room, or above every head: nothing is seen below it."""
+    grid = run(tmp_path, floor_with(high, sides), pitch=pitch)
+    assert classes_at(grid, MIDDLE, EDGE, BESIDE) == [Cell.OBSTACLE] * 3
+    assert classes_at(grid, AWAY) == [Cell.FLOOR]
+
+
+@pytest.mark.parametrize(
+    ("high", "expected"),
+    [(0.30, Cell.OBSTACLE), (0.37, Cell.GATE), (0.42, Cell.FLOOR), (0.8, Cell.FLOOR), (2.4, Cell.FLOOR)],
+)
+def test_what_hangs_over_floor_that_was_seen_goes_by_its_clearance(tmp_path, high, expected):
+    """A table, a lintel, a ceiling."""
+    grid = run(tmp_path, floor_with(high, floor_below=True))
+    assert classes_at(grid, MIDDLE, AWAY) == [expected, Cell.FLOOR]
+
+
+def test_a_table_top_with_an_apron_goes_by_its_clearance(tmp_path):
+    grid = run(tmp_path, floor_with(0.45, sides=True, low=0.37, floor_below=True))
+    assert classes_at(grid, EDGE, AWAY) == [Cell.GATE, Cell.FLOOR]
+
+
+@pytest.mark.parametrize(
+    ("high", "on_it", "beside"),
+    [
+        (0.014, Cell.OBSTACLE, Cell.FLOOR),
+        (0.025, Cell.BUMP, Cell.FLOOR),
+        (0.03, Cell.BUMP, Cell.FLOOR),
+        (0.036, Cell.BUMP, Cell.OBSTACLE),
+        (0.044, Cell.OBSTACLE, Cell.OBSTACLE),
+    ],
+)
+def test_ground_goes_by_its_height(tmp_path, high, on_it, beside):
+    """1.4 cm is no level; 3.6 cm is too high a step from the floor, but not from another bump."""
+    grid = run(tmp_path, floor_with(high, sides=True))
+    assert classes_at(grid, MIDDLE, BESIDE, AWAY) == [on_it, beside, Cell.FLOOR]
 
 
 def test_nan_is_dropped_and_said(tmp_path, capsys):

@@ -12,7 +12,7 @@ from jaxbiped.sensing.view import View
 
 SPEC = GridSpec()
 PARAMS = MapConfig().params()
-BODY = Body(*(jnp.float32(v) for v in (0.10, 0.385, 0.34, 0.03)))  # radius, standing, squatting, step
+BODY = Body(*(jnp.float32(v) for v in (0.10, 0.385, 0.34, 0.03, 0.002, 0.010)))
 ORIGIN = Pose(*(jnp.float32(0),) * 4)
 CAP = 24_000  # points of every view, so that one compiled function serves all scenes
 

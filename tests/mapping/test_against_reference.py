@@ -16,6 +16,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import cobstacles, gridmap, leveling, truth
 from jaxbiped.mapping.grid import Body, GridSpec
 from jaxbiped.mapping.params import MapConfig
+from jaxbiped.mapping.relief import Surfaces
 from jaxbiped.sensing.view import View
 from tests.reference import mapping as reference
 
@@ -42,7 +43,8 @@ def assert_same(ours, theirs):
 
 
 def random_body(rng):
-    return Body(*(np.float32(v) for v in (rng.uniform(0, 0.16), rng.uniform(0.3, 0.5), rng.uniform(0.2, 0.4), 0.03)))
+    numbers = rng.uniform(0, 0.16), rng.uniform(0.3, 0.5), rng.uniform(0.2, 0.4), 0.03, *rng.uniform(0, 0.02, 2)
+    return Body(*(np.float32(v) for v in numbers))
 
 
 def random_params(rng):
@@ -70,6 +72,14 @@ def random_evidence(rng, spec):
     return evidence.astype(np.float32)
 
 
+def random_surfaces(rng, spec):
+    """Ground heights by level, most of them near it, some of so few points that they say nothing."""
+    shape = (spec.ground_levels, *spec.shape)
+    pixels = rng.choice([0, 20, 200, 5000], shape).astype(np.float32)
+    off = rng.normal(0, rng.choice([0.001, 0.006]), shape)
+    return Surfaces(pixels, np.float32(pixels * np.clip(off, -0.015, 0.015)))
+
+
 def random_view(rng, spec, pose):
     """Points inside, outside and on no voxel's face, in the robot's frame; some of them no numbers at all."""
     unit = np.array([spec.pitch, spec.pitch, spec.level_height])
@@ -94,7 +104,8 @@ def test_c_obstacles(spec):
     @given(seeds)
     def check(seed):
         rng = np.random.default_rng(seed)
-        args = random_evidence(rng, spec), random_body(rng), random_params(rng)
+        evidence, surfaces = random_evidence(rng, spec), random_surfaces(rng, spec)
+        args = evidence, surfaces, random_body(rng), random_params(rng)
         assert_same(got := ours(*args), theirs(*args))
         seen.update(np.unique(got[0]))
 
@@ -121,10 +132,15 @@ def test_update_and_classify(spec):
             view = random_view(rng, spec, pose)
             ours_map = ours(ours_map, view, pose, body, params)
             theirs_map = theirs(theirs_map, view, pose, body, params)
-            foot = float(pose.x), float(pose.y), int(rng.integers(3)), float(body.radius)
+            foot = float(pose.x), float(pose.y), float(rng.uniform(-0.01, 0.07)), float(body.radius)
             ours_map, theirs_map = mark(ours_map, *foot), mark_plainly(theirs_map, *foot)
-        # Counts of pixels are whole numbers below 2^24 and add up exactly; footprints are 20 a cell area.
-        assert_same(ours_map, theirs_map)
+        # Counts of pixels are whole numbers below 2^24 and add up exactly (footprints are 20 a cell area). Heights do
+        # not.
+        exact = dataclasses.replace(ours_map, surfaces=None), dataclasses.replace(theirs_map, surfaces=None)
+        assert_same(*exact)
+        heights = ours_map.surfaces, theirs_map.surfaces
+        np.testing.assert_allclose(*(surfaces.weight for surfaces in heights), rtol=1e-5)
+        np.testing.assert_allclose(*(surfaces.rise for surfaces in heights), rtol=1e-5, atol=1e-3)
         assert_same(read(ours_map, params), read_plainly(theirs_map, params))
 
     check()
@@ -137,7 +153,7 @@ def test_truth_grid(seed):
     slots = 5
     overhead = rng.random(slots) < 0.3
     bottom = np.where(overhead, rng.uniform(0.25, 0.45, slots), 0)
-    top = bottom + rng.choice([0.03, 0.06, 0.0612, 0.2, 0.9], slots)
+    top = bottom + rng.choice([0.012, 0.03, 0.034, 0.042, 0.06, 0.0612, 0.2, 0.9], slots)
     x, y, yaw = rng.uniform(0, 0.6, slots), rng.uniform(0, 0.45, slots), rng.uniform(-4, 4, slots)
     half_x, half_y = rng.uniform(0, 0.2, (2, slots))
     used = rng.random(slots) < 0.8
@@ -163,11 +179,12 @@ LEVEL = jax.jit(leveling.level_view, static_argnames="spec")
 @given(seeds)
 def test_level_view(seed):
     rng = np.random.default_rng(seed)
-    n, support = 3000, int(rng.integers(3))
+    n, support = 3000, np.float32(rng.choice([0, 0.025, 0.06]))
     x, y = rng.uniform(0.15, 1.6, n), rng.uniform(-0.8, 0.8, n)
-    ground = rng.choice([0, 1, 2], n, p=rng.dirichlet(np.ones(3))) - support
+    heights = np.array([0, rng.uniform(0.01, 0.045), rng.uniform(0.045, 0.07)])
+    ground = heights[rng.choice(3, n, p=rng.dirichlet(np.ones(3)))] - support
     a, b, c = rng.normal(0, [0.003, 0.02, 0.01])
-    z = 0.03 * ground + a + b * x + c * y + rng.normal(0, 0.003, n)
+    z = ground + a + b * x + c * y + rng.normal(0, 0.003, n)
     z[: n // 10] = rng.uniform(-0.2, 0.6, n // 10)
     weight = rng.integers(0, 5, n) * 16.0
     z[-1], weight[-2] = np.nan, np.inf

@@ -11,8 +11,9 @@ from scipy.ndimage import binary_dilation
 
 from jaxbiped.arenas import sample
 from jaxbiped.errors import InputError
-from jaxbiped.mapping import chart
-from jaxbiped.mapping.chart import CUBE, SCAN, cover_voxels, lay_out, make_chart
+from jaxbiped.mapping import cover
+from jaxbiped.mapping.chart import SCAN, lay_out, make_chart
+from jaxbiped.mapping.cover import CUBE, cover_voxels
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
 from tests.mapping.scenes import BODY
@@ -107,7 +108,7 @@ def test_many_points_are_counted_a_part_at_a_time(monkeypatch):
     points[::7] = np.nan
     points[3], points[4] = np.inf, -np.inf
     whole = cover_voxels(points, GridSpec(), (0.0, 0.0))
-    monkeypatch.setattr(chart, "AT_ONCE", 999)
+    monkeypatch.setattr(cover, "AT_ONCE", 999)
     np.testing.assert_array_equal(cover_voxels(points, GridSpec(), (0.0, 0.0)), whole)
 
 

@@ -11,7 +11,7 @@ import pytest
 from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.mapping import Cell, GridSpec, MapConfig, classify, empty, update
 from jaxbiped.mapping.fading import HIDDEN, Eye, missed
-from jaxbiped.mapping.gridmap import voxelise
+from jaxbiped.mapping.gridmap import voxel_of, voxelise
 from jaxbiped.sensing import raycast
 from jaxbiped.sensing.camera import T_robot_camera, mount
 from jaxbiped.sensing.presets import sensor_preset
@@ -87,7 +87,7 @@ def test_what_is_missed_as_by_plain_loops(seed):
     arena = as_jax(make([BLOCK, (1.2, 0.5, 0.4, 0.1, 0.1, 0.0, 0.2)]))
     view = raycast.measure(arena, pose, CAMERA, NOISE, IMAGE, jnp.uint32(seed))
     at_ = mount(CAMERA)
-    points = voxelise(view, pose, PARAMS, SPEC)
+    points = voxelise(view, *voxel_of(view, pose, PARAMS, SPEC), SPEC)
     found = np.asarray(missed(view, points, pose, CAMERA, at_, IMAGE, SPEC))
     T = np.linalg.inv(np.asarray(T_robot_camera(at_), float))
 

@@ -155,15 +155,15 @@ def test_a_pose_that_is_no_number_adds_nothing(axis):
 
 def test_footprint():
     mark = jax.jit(mark_footprint, static_argnames="spec")
-    classes, levels = READ(mark(empty(SPEC), 0.525, 0.525, 1, 0.06, SPEC), PARAMS, spec=SPEC)
+    classes, levels = READ(mark(empty(SPEC), 0.525, 0.525, 0.03, 0.06, SPEC), PARAMS, spec=SPEC)
     expected = np.zeros(SPEC.shape)
     expected[10, 9:12] = expected[9:12, 10] = Cell.BUMP  # 5 cm to the next centre, 7 cm to the oblique one
     np.testing.assert_array_equal(classes, expected)
     np.testing.assert_array_equal(levels, expected > 0)
-    classes, _ = READ(mark(empty(SPEC), 0.51, 0.54, 0, 0.0, SPEC), PARAMS, spec=SPEC)
+    classes, _ = READ(mark(empty(SPEC), 0.51, 0.54, 0.0, 0.0, SPEC), PARAMS, spec=SPEC)
     assert np.asarray(classes)[10, 10] == Cell.FLOOR and np.asarray(classes).sum() == Cell.FLOOR
     for place in ((-1.0, 0.5), (np.nan, 0.5), (0.5, np.inf)):
-        assert not np.asarray(mark(empty(SPEC), *place, 0, 0.05, SPEC).votes).any()
+        assert not np.asarray(mark(empty(SPEC), *place, 0.0, 0.05, SPEC).votes).any()
 
 
 @pytest.mark.parametrize("pitch", [0.1, 0.025])

@@ -20,7 +20,7 @@ def tilted(points, roll, pitch, offset=0.0, noise=0.002):
     return np.column_stack([x - pitch * points[:, 2], y - roll * points[:, 2], z])
 
 
-def leveled(points, support=0, **kwargs):
+def leveled(points, support=0.0, **kwargs):
     result = LEVEL(view(points, **kwargs), support, PARAMS, spec=SPEC)
     return np.column_stack([result.x, result.y, result.z])[: len(points)]
 
@@ -35,13 +35,13 @@ def bumps(heights):
 
 
 SCENES = {
-    "floor": (FLOOR, 0),
-    "a bump near by": (bumps([0.03]), 0),
-    "bumps fill the view": (bumps([0.03] * 6), 0),
-    "stairs": (bumps([0.03, 0.06, 0.06, 0.03]), 0),
-    "a wall behind": (np.concatenate([FLOOR, wall((1.0, 1.0), (-0.8, 0.8), (0.0, 0.5), step=0.02)]), 0),
-    "from a bump of level 1": (bumps([0.03]) - [0, 0, 0.03], 1),
-    "from a bump of level 2": (bumps([0.06, 0.03]) - [0, 0, 0.06], 2),
+    "floor": (FLOOR, 0.0),
+    "a bump near by": (bumps([0.03]), 0.0),
+    "bumps fill the view": (bumps([0.03] * 6), 0.0),
+    "stairs": (bumps([0.03, 0.06, 0.06, 0.03]), 0.0),
+    "a wall behind": (np.concatenate([FLOOR, wall((1.0, 1.0), (-0.8, 0.8), (0.0, 0.5), step=0.02)]), 0.0),
+    "from a bump of level 1": (bumps([0.03]) - [0, 0, 0.03], 0.03),
+    "from a bump of level 2": (bumps([0.06, 0.03]) - [0, 0, 0.06], 0.06),
 }
 
 
@@ -55,6 +55,26 @@ def test_levels_come_out(scene, roll, pitch):
     assert np.abs(got - points)[ground].max() < 0.004 + 4 * 0.002
     assert np.abs(np.mean((got - points)[ground], axis=0)).max() < 0.002
     assert (np.round(got[ground, 2] / 0.03) == np.round(points[ground, 2] / 0.03)).mean() > 0.999
+
+
+@pytest.mark.parametrize("height", [0.016, 0.018, 0.025, 0.035, 0.04, 0.045, 0.05, 0.055])
+@pytest.mark.parametrize("first", [0.2, 0.4], ids=["fills the view", "ahead"])
+def test_a_bump_of_any_height_neither_lifts_nor_tilts_the_floor(height, first):
+    """Snapped to a level it would be taken for one of 3 or 6 cm, and the floor for lower or higher by the rest."""
+    points = FLOOR.copy()
+    bump = points[:, 0] > first
+    points[bump, 2] = height
+    got = leveled(tilted(points, 0.2, -0.3))
+    near = points[:, 0] < 0.6  # where heights decide on a step
+    assert np.abs(np.mean(got[bump & near, 2]) - height) < 0.0018  # `PLAIN`, and noise
+    assert np.abs(np.mean(got[~bump & near, 2])) < 0.0018
+    assert np.abs(np.mean(got[bump, 2]) - height) < 0.004
+
+
+def test_seen_from_a_bump_of_an_odd_height_the_floor_lies_as_much_lower():
+    points = bumps([0.0]) - [0, 0, 0.024]
+    got = leveled(tilted(points, 0.2, 0.3), 0.024)
+    assert np.abs(np.mean(got[:, 2]) + 0.024) < 0.001
 
 
 def test_outliers_do_not_matter():
@@ -88,5 +108,5 @@ def test_points_without_weight_take_no_part():
     mixed = np.concatenate([tilted(FLOOR, 0, 1), tilted(FLOOR, 0, -3)])
     full = view(mixed)
     weight = full.weight.at[len(FLOOR) :].set(0)
-    got = LEVEL(View(full.x, full.y, full.z, weight), 0, PARAMS, spec=SPEC)
+    got = LEVEL(View(full.x, full.y, full.z, weight), 0.0, PARAMS, spec=SPEC)
     assert np.abs(np.asarray(got.z)[: len(FLOOR)]).max() < 0.012

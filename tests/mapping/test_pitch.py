@@ -14,7 +14,7 @@ from jaxbiped.sensing.view import View
 PITCHES = (0.10, 0.05, 0.025, 0.02, 0.0125)
 SPACING = 0.0025  # [m] of the points: a whole number of them lies along a cell of each pitch
 SIZE_X, SIZE_Y = 0.8, 0.4
-BODY = Body(*(jnp.float32(v) for v in (0.04, 0.385, 0.34, 0.03)))
+BODY = Body(*(jnp.float32(v) for v in (0.04, 0.385, 0.34, 0.03, 0.002, 0.010)))
 PARAMS = MapConfig(max_range=9.0).params()
 
 

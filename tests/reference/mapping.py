@@ -11,28 +11,43 @@ from dataclasses import replace
 import numpy as np
 
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mapping.gridmap import FOOTPRINT_POINTS, GridMap
-from jaxbiped.mapping.leveling import PIXEL_SD, PRIOR_OFFSET, PRIOR_PIXELS, PRIOR_SLOPE, ROUNDS, SAMPLE
+from jaxbiped.mapping.gridmap import AS_GOOD, FOOTPRINT_POINTS, GridMap
+from jaxbiped.mapping.leveling import (
+    OFF_LEVEL,
+    OWN_HEIGHT,
+    PIXEL_SD,
+    PLAIN,
+    PRIOR_OFFSET,
+    PRIOR_PIXELS,
+    PRIOR_SLOPE,
+    ROUNDS,
+    SAMPLE,
+)
+from jaxbiped.mapping.relief import EDGE, FACE, SURE, Surfaces
 from jaxbiped.sensing.view import View
 
 
 def empty(spec):
-    shape = spec.shape
-    return GridMap(*(np.zeros((*shape, n), np.float32) for n in (spec.levels, 4, spec.ground_levels)))
+    zeros = [np.zeros((*spec.shape, n), np.float32) for n in (spec.levels, 4, spec.ground_levels)]
+    return GridMap(*zeros, Surfaces(*np.zeros((2, spec.ground_levels, *spec.shape), np.float32)))
 
 
 def update(grid_map, view, pose, body, params, spec, refit=True):
     if refit:
-        view = level_view(view, int(np.round(pose.z / np.float32(spec.level_height))), params, spec)
-    points = voxelise(view, pose, params, spec)
+        view = level_view(view, pose.z, params, spec)
+    voxels, above, weight, near = place(view, pose, params, spec)
+    points = count_in(voxels, weight, (*spec.shape, spec.levels))
     points[points < params.voxel_points * np.float32(spec.cell_share)] = 0
     evidence = grid_map.evidence + points
     count = points.sum(-1)
     count[count < params.view_points * np.float32(spec.cell_share)] = 0
-    return add_votes(replace(grid_map, evidence=evidence), count, *c_obstacles(evidence, body, params, spec))
+    surfaces = add_surfaces(grid_map.surfaces, voxels, above, weight * near, spec)
+    classes, levels = c_obstacles(evidence, surfaces, body, params, spec)
+    return add_votes(replace(grid_map, evidence=evidence, surfaces=surfaces), count, classes, levels)
 
 
-def voxelise(view, pose, params, spec):
+def place(view, pose, params, spec):
+    """Voxel (i, j, k) [3, n], height and weight of each point that counts, and how much its height does."""
     (height, width), depth = spec.shape, spec.levels
     numbers = np.stack([view.x, view.y, view.z, view.weight]).astype(np.float32)
     x, y, z, weight = numbers[:, np.isfinite(numbers).all(0) & (numbers[3] > 0)]
@@ -46,9 +61,37 @@ def voxelise(view, pose, params, spec):
         [np.floor(world_y / pitch), np.floor(world_x / pitch), np.round((z + pose.z) / rise) - spec.lowest]
     )
     inside = ((index >= 0) & (index < np.array([[height], [width], [depth]]))).all(0)
-    flat = np.ravel_multi_index(index[:, inside].astype(int), (height, width, depth))
-    sums = np.bincount(flat, weight[inside], height * width * depth)
-    return sums.reshape(height, width, depth).astype(np.float32)
+    near = 1 / (1 + (x**2 + y**2) / np.float32(params.height_range) ** 2)
+    return index[:, inside].astype(int), (z + pose.z)[inside], weight[inside], near[inside]
+
+
+def count_in(index, weight, shape):
+    """Sums of weights in each element of an array."""
+    sums = np.bincount(np.ravel_multi_index(index, shape), weight, np.prod(shape, dtype=int))
+    return sums.reshape(shape).astype(np.float32)
+
+
+def add_surfaces(surfaces, voxels, above, weight, spec):
+    """With the points of one view, and their heights: of raised levels, without the faces below them."""
+    level = np.maximum(voxels[2] + spec.lowest, 0)
+    rise = above - level * np.float32(spec.level_height)
+    lowest = np.full(surfaces.weight.shape, -np.inf, np.float32)
+    known = surfaces.weight > 0
+    lowest[known] = surfaces.rise[known] / np.maximum(surfaces.weight[known], np.float32(1e-6)) - np.float32(FACE)
+    lowest[0] = -np.inf
+    good = level < spec.ground_levels
+    good[good] = rise[good] >= lowest[level[good], voxels[0, good], voxels[1, good]]
+    cell = np.stack([level, *voxels[:2]])[:, good]
+    added = (count_in(cell, values[good], surfaces.weight.shape) for values in (weight, weight * rise))
+    return Surfaces(*(old + new for old, new in zip((surfaces.weight, surfaces.rise), added, strict=True)))
+
+
+def ground_height(grid_map, ij, z, spec):
+    """Height of a cell's ground as measured, at the level of z."""
+    level = int(np.clip(np.round(z / np.float32(spec.level_height)), 0, spec.ground_levels - 1))
+    weight, rise = grid_map.surfaces.weight[level, *ij], grid_map.surfaces.rise[level, *ij]
+    off = rise / max(weight, 1e-6)
+    return np.float32(level * spec.level_height + (off if abs(off) > AS_GOOD else 0.0) if weight > 0 else z)
 
 
 def add_votes(grid_map, count, classes, levels):
@@ -59,7 +102,7 @@ def add_votes(grid_map, count, classes, levels):
     return replace(grid_map, votes=votes, level_votes=level_votes)
 
 
-def c_obstacles(evidence, body, params, spec):
+def c_obstacles(evidence, surfaces, body, params, spec):
     """Classes and ground levels; rules as in the package."""
     least = np.full(evidence.shape, params.voxel_points * np.float32(spec.cell_share), np.float32)
     least[..., 1:] = np.maximum(least[..., 1:], params.voxel_share * evidence[..., :-1])
@@ -68,18 +111,58 @@ def c_obstacles(evidence, body, params, spec):
     occupied = voxels[..., -spec.lowest :].copy()  # by level, from 0
     occupied[..., 0] = voxels[..., : 1 - spec.lowest].any(-1)
     ground = ground_level(occupied, evidence, spec)
-    return read_cells(solid_levels(voxels, evidence, params, spec), ground, body, params.head_margin, spec)
+    solid = solid_levels(voxels, evidence, params, spec)
+    relief = read_relief(surfaces, ground, occupied, solid, params, spec)
+    bears = body.step_tolerance - params.height_margin, body.height_tolerance - params.height_margin
+    body = replace(body, step_tolerance=bears[0], height_tolerance=bears[1])
+    return read_cells(solid, ground, relief, body, params.head_margin, spec)
+
+
+def patch_sum(values, spec):
+    """Sums over the patch of about 5 x 5 cm around each cell."""
+    height, width = values.shape[:2]
+    aside = 0
+    while (2 * (aside + 1)) * spec.pitch <= 0.05 + 1e-9:
+        aside += 1
+    padded = np.pad(values, ((aside, aside), (aside, aside), (0, 0)))
+    rows = sum(padded[i : i + height] for i in range(2 * aside + 1))
+    return sum(rows[:, j : j + width] for j in range(2 * aside + 1))
+
+
+def read_relief(surfaces, ground, occupied, solid, params, spec):
+    """(height, error, top) of each cell, one after the other."""
+    weight, rise = (patch_sum(np.moveaxis(leaf, 0, -1), spec) for leaf in (surfaces.weight, surfaces.rise))
+    many = np.maximum(weight, np.float32(1e-6))
+    mean = (np.arange(spec.ground_levels) * np.float32(spec.level_height)).astype(np.float32) + rise / many
+    error = np.float32(SURE) * np.float32(params.height_sd) / np.sqrt(many)
+    height = ground * np.float32(spec.level_height)
+    sd, top = np.zeros(ground.shape, np.float32), np.full(ground.shape, -np.inf, np.float32)
+    for i, j in np.ndindex(ground.shape):
+        for level in range(spec.ground_levels):
+            if not solid[i, j, level]:
+                continue
+            above = level + 1 < spec.ground_levels and occupied[i, j, level + 1]
+            if above and mean[i, j, level + 1] - mean[i, j, level] > np.float32(EDGE):
+                continue
+            if level == ground[i, j]:
+                height[i, j], sd[i, j] = mean[i, j, level], error[i, j, level]
+            top[i, j] = mean[i, j, level] - error[i, j, level]
+    alone = np.array([np.max(around(top, i, j), initial=-np.inf) for i, j in np.ndindex(top.shape)])
+    return height, sd, np.minimum(top, alone.reshape(top.shape))
+
+
+def around(values, i, j):
+    """Those of the up to eight cells around one."""
+    near = np.zeros(values.shape, bool)
+    near[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] = True
+    near[i, j] = False
+    return values[near]
 
 
 def solid_levels(voxels, evidence, params, spec):
     """Occupied voxels with enough points in the patch around them, and with such a neighbour."""
     height, width = voxels.shape[:2]
-    aside = 0
-    while (2 * (aside + 1)) * spec.pitch <= 0.05 + 1e-9:
-        aside += 1
-    padded = np.pad(evidence, ((aside, aside), (aside, aside), (0, 0)))
-    sides = range(2 * aside + 1)
-    patch = sum(padded[i : i + height, j : j + width] for i in sides for j in sides)
+    patch = patch_sum(evidence, spec)
     dense = (voxels & (patch >= params.solid_points))[..., -spec.lowest :]
     dense[..., 0] |= (voxels & (patch >= params.solid_points))[..., : 1 - spec.lowest].any(-1)
     if params.below_points is not None:
@@ -108,7 +191,7 @@ def ground_level(occupied, evidence, spec):
     return np.where(occupied.any(-1) & (end <= spec.ground_levels), stands.argmax(-1), 0)
 
 
-def read_cells(occupied, ground, body, head_margin, spec):
+def read_cells(occupied, ground, relief, body, head_margin, spec):
     near = dilate(occupied, body.radius, spec)
     lower_face = (np.arange(occupied.shape[-1], dtype=np.float32) - np.float32(0.5)) * np.float32(spec.level_height)
     above_step = lower_face >= body.step
@@ -120,20 +203,41 @@ def read_cells(occupied, ground, body, head_margin, spec):
         squatting = span[..., above & (faces + np.float32(head_margin) < body.squatting)].any(-1)
         classes[(ground == level) & standing] = Cell.GATE
         classes[(ground == level) & squatting] = Cell.OBSTACLE
+    height, error, top = relief
+    too_high = height + error + np.float32(body.step) + np.float32(body.step_tolerance)
+    classes[dilate(top[..., None], body.radius, spec)[..., 0] > too_high] = Cell.OBSTACLE
+    classes[is_untenable(height, error, ground, np.float32(body.height_tolerance), spec)] = Cell.OBSTACLE
     return classes.astype(np.int8), ground.astype(np.int8)
 
 
+def is_untenable(height, error, ground, most, spec):
+    """Whether a step into a cell ends too far off the height of its level, cell by cell."""
+    off = height - ground * np.float32(spec.level_height)
+    high, low = off - error, off + error
+    out = np.zeros(ground.shape, bool)
+    for i, j in np.ndindex(ground.shape):
+        up, down = high[i, j], low[i, j]
+        out[i, j] = up > most or down < -most
+        out[i, j] |= up > most / 2 and up - around(low, i, j).min(initial=np.inf) > most
+        out[i, j] |= down < -most / 2 and around(high, i, j).max(initial=-np.inf) - down > most
+    return out
+
+
 def dilate(occupied, radius, spec):
-    """Whether a voxel of a level is occupied in a cell or in one whose square comes nearer than the radius."""
+    """The greatest of each level's values in a cell and in those whose square comes nearer than the radius.
+
+    Of Booleans: whether a voxel of the level is occupied there. Beyond the rim nothing is.
+    """
     height, width = occupied.shape[:2]
     reach = int(spec.max_radius / spec.pitch + 1)
-    padded = np.pad(occupied, ((reach, reach), (reach, reach), (0, 0)))
+    nothing = False if occupied.dtype == bool else -np.inf
+    padded = np.pad(occupied, ((reach, reach), (reach, reach), (0, 0)), constant_values=nothing)
     near = occupied.copy()
     for di in range(-reach, reach + 1):
         for dj in range(-reach, reach + 1):
             away = np.array([max(abs(di) - 0.5, 0), max(abs(dj) - 0.5, 0)], np.float32) * np.float32(spec.pitch)
             if max(away) < spec.max_radius and (away**2).sum() < np.float32(radius) ** 2:
-                near |= padded[reach + di : reach + di + height, reach + dj : reach + dj + width]
+                near = np.maximum(near, padded[reach + di : reach + di + height, reach + dj : reach + dj + width])
     return near
 
 
@@ -148,7 +252,7 @@ def classify(grid_map, params, spec):
     return classes.astype(np.int8), level.astype(np.int8)
 
 
-def mark_footprint(grid_map, x, y, level, radius, spec):
+def mark_footprint(grid_map, x, y, z, radius, spec):
     rows, columns = spec.shape
     count = np.zeros(spec.shape, np.float32)
     for i in range(rows):
@@ -156,15 +260,25 @@ def mark_footprint(grid_map, x, y, level, radius, spec):
             dx, dy = (np.float32((k + 0.5) * spec.pitch - at) for k, at in ((j, x), (i, y)))
             if dx**2 + dy**2 <= np.float32(radius) ** 2 or max(abs(dx), abs(dy)) <= spec.pitch / 2:
                 count[i, j] = FOOTPRINT_POINTS * spec.cell_share
-    level = min(max(level, 0), spec.ground_levels - 1)
-    evidence = grid_map.evidence.copy()
+    rise = np.float32(spec.level_height)
+    level = int(np.clip(np.round(np.float32(z) / rise), 0, spec.ground_levels - 1))
+    evidence, pixels, heights = (
+        leaf.copy() for leaf in (grid_map.evidence, grid_map.surfaces.weight, grid_map.surfaces.rise)
+    )
     evidence[..., level - spec.lowest] += count
+    pixels[level] += count
+    heights[level] += count * (np.float32(z) - level * rise)
+    marked = replace(grid_map, evidence=evidence, surfaces=Surfaces(pixels, heights))
     kind = Cell.BUMP if level else Cell.FLOOR
-    return add_votes(replace(grid_map, evidence=evidence), count, *np.full((2, *spec.shape), [[[kind]], [[level]]]))
+    return add_votes(marked, count, *np.full((2, *spec.shape), [[[kind]], [[level]]]))
 
 
 def level_view(view, support, params, spec):
-    """Floor-plane refit by `numpy.linalg.lstsq` in double precision; the package's rounds and prior."""
+    """Floor-plane refit by `numpy.linalg.lstsq` in double precision; the package's rounds and prior.
+
+    Each half level has a lift of its own as one more unknown; the second of two fits takes those that stand for more
+    than noise as known, and the others for none.
+    """
     numbers = np.stack([view.x, view.y, view.z, view.weight]).astype(float)
     stride = max(1, numbers.shape[1] // SAMPLE)
     stride += stride % 2 == 0
@@ -172,23 +286,30 @@ def level_view(view, support, params, spec):
     x, y, z, pixels = numbers[:, np.isfinite(numbers).all(0) & (numbers[3] > 0)]
     pixels = pixels * stride
     features = np.stack([np.ones_like(x), x, y], -1)
-    grounds = np.arange(spec.ground_levels) - support  # relative to where the robot stands
+    rise, count = spec.level_height / 2, 2 * spec.ground_levels - 1
 
-    def off_level(plane):
+    def off_level(plane, lifts):
         above = z - features @ plane
-        nearest = grounds[np.abs(above[:, None] - grounds * spec.level_height).argmin(1)] * spec.level_height
-        return above - nearest, nearest
+        level = np.clip(np.round((above + support) / rise), 0, count - 1).astype(int)
+        return level, above - (level * rise - support) - lifts[level]
 
-    prior = np.diag(PIXEL_SD * np.sqrt(PRIOR_PIXELS) / np.array([PRIOR_OFFSET, PRIOR_SLOPE, PRIOR_SLOPE]))
-    plane = np.zeros(3)
+    def prior(*sds):
+        return np.diag(PIXEL_SD * np.sqrt(PRIOR_PIXELS) / np.array(sds))
+
+    plane, lifts = np.zeros(3), np.zeros(count)
     for reach, width in ROUNDS:
-        residual, nearest = off_level(plane)
+        level, residual = off_level(plane, lifts)
         weight = np.maximum(1 - (residual / (width * params.refit_inlier)) ** 2, 0) * np.sqrt(pixels)
         weight[np.hypot(x, y) >= reach] = 0
-        left = np.concatenate([features * weight[:, None], prior])
-        plane = np.linalg.lstsq(left, np.append((z - nearest) * weight, [0, 0, 0]))[0]
+        target = z - (level * rise - support)
+        both = np.concatenate([features, np.eye(count)[level]], axis=1) * weight[:, None]
+        known = prior(OWN_HEIGHT, PRIOR_SLOPE, PRIOR_SLOPE, *[OFF_LEVEL] * count)
+        found = np.linalg.lstsq(np.concatenate([both, known]), np.append(target * weight, np.zeros(3 + count)))[0]
+        lifts = np.where(np.abs(found[3:]) > PLAIN, found[3:], 0)
+        left = np.concatenate([features * weight[:, None], prior(PRIOR_OFFSET, PRIOR_SLOPE, PRIOR_SLOPE)])
+        plane = np.linalg.lstsq(left, np.append((target - lifts[level]) * weight, [0, 0, 0]))[0]
 
-    residual, _ = off_level(plane)
+    _, residual = off_level(plane, lifts)
     on_floor = (np.abs(residual) < params.refit_inlier) & (np.hypot(x, y) < ROUNDS[-1][0])
     steep, high = np.hypot(*plane[1:]) >= params.refit_slope, abs(plane[0]) >= params.refit_offset
     if steep or high or pixels[on_floor].sum() < params.refit_points:
@@ -206,7 +327,7 @@ def truth_grid(boxes, spec, body, samples=5, least_share=0.05):
     """Classes and levels known perfectly; boxes as rows (x, y, yaw, half_x, half_y, bottom, top, overhead)."""
     (rows, columns), depth = spec.shape, spec.levels + spec.lowest
     places = np.zeros((rows, columns, samples**2, depth), bool)
-    ground = np.zeros((rows, columns, samples**2), int)
+    heights = np.zeros((rows, columns, samples**2), np.float32)
     places[..., 0] = True
     sub = (np.arange(samples) + 0.5) / samples
     for x, y, yaw, half_x, half_y, bottom, top, overhead in boxes:
@@ -217,8 +338,16 @@ def truth_grid(boxes, spec, body, samples=5, least_share=0.05):
         first, last = round(bottom / spec.level_height) if overhead else 0, round(top / spec.level_height)
         places[here, first : last + 1] = True
         if not overhead:
-            ground[here] = np.maximum(ground[here], last)
+            heights[here] = np.maximum(heights[here], top)
+    ground = np.round(heights / np.float32(spec.level_height)).astype(int)
     walkable = (ground[..., None] == np.arange(spec.ground_levels)).sum(2)
     best = spec.ground_levels - 1 - walkable[..., ::-1].argmax(-1)
     level = np.where(walkable.sum(-1) >= samples**2 / 2, best, 0)
-    return read_cells(places.mean(2) > least_share, level, body, 0.0, spec)
+    own, top = level * np.float32(spec.level_height), np.full(level.shape, -np.inf, np.float32)
+    for i, j in np.ndindex(level.shape):
+        at, all_heights = ground[i, j], heights[i, j]
+        if (at == level[i, j]).any():
+            own[i, j] = all_heights[at == level[i, j]].mean()
+        shares = walkable[i, j] / samples**2
+        top[i, j] = max((all_heights[at == k].max() for k in np.flatnonzero(shares > least_share)), default=-np.inf)
+    return read_cells(places.mean(2) > least_share, level, (own, np.zeros_like(own), top), body, 0.0, spec)

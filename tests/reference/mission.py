@@ -75,7 +75,7 @@ def start(arena, settings, seed, spec):
     world = SimpleNamespace(pose=pose, squat=False, distance=0.0, time=0.0, decisions=0, code=code, seed=seed)
     mind = SimpleNamespace(
         belief=Belief(pose, np.diag(settings.limits.start_variance)),
-        level=int(np.round(pose.z / spec.level_height)) if math.isfinite(away) else 0,
+        z=pose.z if math.isfinite(away) else f32(0),
         grid_map=None,
         squat=False,
         look=False,
@@ -105,16 +105,17 @@ def perceive(mind, view, marks, arena, settings, spec):
     """Localise and update the map: classes, levels, and the robot's cell."""
     mind.belief = sensing.correct(mind.belief, arena.landmarks, marks)
     x, y, yaw = sensing.mean_of(mind.belief)
-    pose = Pose(f32(x), f32(y), f32(mind.level * spec.level_height), f32(yaw))
     if mind.grid_map is None:
         radius = settings.limits.body_radius
-        mind.grid_map = mapping.mark_footprint(mapping.empty(spec), pose.x, pose.y, mind.level, radius, spec)
+        mind.grid_map = mapping.mark_footprint(mapping.empty(spec), f32(x), f32(y), mind.z, radius, spec)
+    ij = motion.cell_of(x, y, spec)
+    mind.z = mapping.ground_height(mind.grid_map, ij, mind.z, spec)
+    pose, level = Pose(f32(x), f32(y), mind.z, f32(yaw)), int(np.round(mind.z / f32(spec.level_height)))
     mind.grid_map = mapping.update(mind.grid_map, view, pose, settings.body, settings.mapping, spec)
     classes, levels = mapping.classify(mind.grid_map, settings.mapping, spec)
-    ij = motion.cell_of(x, y, spec)
     if classes[ij] != Cell.GATE:
-        classes[ij] = Cell.BUMP if mind.level else Cell.FLOOR
-    levels[ij] = mind.level
+        classes[ij] = Cell.BUMP if level else Cell.FLOOR
+    levels[ij] = level
     return classes, levels, ij
 
 
@@ -185,7 +186,7 @@ def conclude(world, mind, command, verdict, arena, settings):
         world.distance += command.length
         world.time += float(done.time)
         mind.belief = sensing.predict(mind.belief, *done.moved, done.variances)
-        mind.level += command.rise
+        mind.z = f32(mind.z + command.rise * f32(settings.limits.rise))
     away = math.hypot(arena.goal_xy[0] - world.pose.x, arena.goal_xy[1] - world.pose.y)
     if away <= limits.goal_radius:
         code = Code.REACHED

@@ -265,7 +265,7 @@ def measure_oracle(arena, pose, size_xy, spacing=0.025, level_height=0.03, level
                         ground = max(ground, boxes.top[m])
             points.append((x, y, ground, 2 * weight))
             for z in np.arange(levels) * level_height:
-                if z < ground - 1e-9:
+                if z < ground - level_height / 2 - 1e-9:
                     points.append((x, y, z, weight))
                 elif z + level_height / 2 > below and z - level_height / 2 <= above:
                     points.append((x, y, min(max(z, below), above), weight))

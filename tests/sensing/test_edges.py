@@ -36,7 +36,7 @@ def bump(distance, angle, rise, deep=0.30, half_width=0.5, aside=0.0):
 @jax.jit
 def view_of(arena, where, seed, look):
     view = measure_raycast(arena, where, CAMERA, NOISE, IMAGE, seed, look, False)
-    return level_view(view, jnp.round(where.z / RISE).astype(jnp.int32), PARAMS, SPEC)
+    return level_view(view, where.z, PARAMS, SPEC)
 
 
 @jax.jit
