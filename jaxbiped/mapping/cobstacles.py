@@ -47,35 +47,11 @@ def c_obstacles(
     checks.finite("evidence", evidence)
     for name in ("weight", "rise"):
         checks.finite(f"surfaces.{name}", getattr(surfaces, name))
-    evidence, surfaces = jax.lax.stop_gradient((evidence, surfaces))  # classes have none, and `kept` cannot give any
-
-    def measure():
-        columns = occupied_levels(evidence, params, spec)
-        ground = ground_level(columns, evidence, spec)
-        return columns, ground, solid_levels(columns, evidence, params, spec)
-
-    def lift(columns, ground, solid):
-        return read_relief(surfaces, ground, columns, solid, params, spec)
-
-    def read(ground, solid, relief):
-        return read_cells(solid, ground, relief, careful(body, params), params.head_margin, spec)
-
-    number = evidence[0, 0, 0]
-    columns, ground, solid = kept(measure, number)
-    relief = kept(lift, number, columns, ground, solid)
-    return kept(read, number, ground, solid, relief)
-
-
-def kept(function, number: Float[Array, ""], *arguments):
-    """The result of a function, in memory.
-
-    Without this the compiler fuses what compares a cell with its neighbours into one loop, which works everything out
-    anew for each of them, and is too long to be vectorised: ten times as slow. A barrier does not keep it from that on
-    CPUs; a loop does whose end it cannot foresee, and which is run once. `number` is any, and not NaN.
-    """
-    once = jnp.where(number > -jnp.inf, 1, 2)
-    empty = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(function, *arguments))
-    return jax.lax.fori_loop(0, once, lambda _, __: function(*arguments), empty)
+    columns = occupied_levels(evidence, params, spec)
+    ground = ground_level(columns, evidence, spec)
+    solid = solid_levels(columns, evidence, params, spec)
+    relief = read_relief(surfaces, ground, columns, solid, params, spec)
+    return read_cells(solid, ground, relief, careful(body, params), params.head_margin, spec)
 
 
 def careful(body: Body, params: MapParams) -> Body:

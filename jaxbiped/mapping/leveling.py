@@ -68,25 +68,34 @@ def fit_floor(view: View, support: Scalar, params: MapParams, spec: GridSpec) ->
     range_squared = x * x + y * y
     rise, count = spec.level_height / 2, 2 * spec.ground_levels - 1
 
-    def off_level(plane, lifts):
-        """Half level that each point is nearest to, and its height [m] over the ground there."""
+    def weigh(plane, lifts, reach, width):
+        """Half level that each point is nearest to, its height [m] over the ground there, and its weight."""
         above = z - (plane[0] + plane[1] * x + plane[2] * y)
         level = jnp.clip(jnp.round((above + support) / rise), 0, count - 1)
         lift = sum(jnp.where(level == k, lifts[k], 0.0) for k in range(count))
-        return level, above - (level * rise - support) - lift
+        residual = above - (level * rise - support) - lift
+        near = jnp.where(range_squared < reach**2, pixels, 0.0)
+        return level, residual, near * jnp.maximum(1 - (residual / (width * params.refit_inlier)) ** 2, 0.0) ** 2
+
+    def solve(level, weight):
+        height = z - (level * rise - support)
+        parts = [jnp.where(level == k, weight, 0.0) for k in range(count)]
+        first = tuple(jnp.array([jnp.sum(part * factor) for part in parts]) for factor in (1.0, x, y, height))
+        second = tuple(jnp.sum(weight * product) for product in (x * x, x * y, y * y))
+        return solve_ground(first, second, tuple(jnp.sum(weight * height * other) for other in (x, y)))
 
     plane, lifts = (jnp.float32(0),) * 3, (jnp.float32(0),) * count
-    for reach, width in ROUNDS:
-        level, residual = off_level(plane, lifts)
-        near = jnp.where(range_squared < reach**2, pixels, 0.0)
-        weight = near * jnp.maximum(1 - (residual / (width * params.refit_inlier)) ** 2, 0.0) ** 2
-        above = z - (level * rise - support)
-        features = jnp.stack([jnp.ones_like(x), x, y, above, x * x, x * y, y * y, x * above, y * above])
-        weights = jnp.where(level == jnp.arange(count)[:, None], weight, 0.0)
-        # One product for all sums: as reductions, each of them works the weights out anew.
-        plane, lifts = solve_ground(jax.lax.dot_general(weights, features, (((1,), (1,)), ((), ()))))
+    reaches, widths = (jnp.array(column) for column in zip(*ROUNDS, strict=True))
 
-    _, residual = off_level(plane, lifts)
+    def refine(k, state):
+        level, _, weight, _ = state
+        plane, lifts = solve(level, weight)
+        after = jnp.minimum(k + 1, len(ROUNDS) - 1)
+        return *weigh(plane, lifts, reaches[after], widths[after]), plane
+
+    # A loop, so that weights are worked out once a round: unrolled, the compiler does so anew for each sum of them.
+    state = *weigh(plane, lifts, reaches[0], widths[0]), plane
+    _, residual, _, plane = jax.lax.fori_loop(0, len(ROUNDS), refine, state)
     on_floor = (jnp.abs(residual) < params.refit_inlier) & (range_squared < ROUNDS[-1][0] ** 2)
     accept = (
         (jnp.hypot(plane[1], plane[2]) < params.refit_slope)
@@ -96,33 +105,36 @@ def fit_floor(view: View, support: Scalar, params: MapParams, spec: GridSpec) ->
     return tuple(jnp.where(accept, number, 0.0) for number in plane)
 
 
-def solve_ground(sums: Float[Array, "K 9"]) -> tuple[tuple[Scalar, Scalar, Scalar], tuple[Scalar, ...]]:
+def solve_ground(
+    first: tuple[Float[Array, "K"], ...], second: tuple[Scalar, Scalar, Scalar], right: tuple[Scalar, Scalar]
+) -> tuple[tuple[Scalar, Scalar, Scalar], tuple[Scalar, ...]]:
     """(a, b, c) of z = a + b x + c y + lift, and the lift [m] of each half level's ground: least squares with priors.
 
     The lifts are eliminated, solved for, and, where they are no more than noise, taken for none; the plane is then that
     of what is left.
 
     Args:
-      sums: of the weights of each half level's points, times 1, x, y, z, xx, xy, yy, xz and yz; z over the half level.
+      first: of the weights of each half level's points, times 1, x, y and z; z over the half level.
+      second: of all weights, times xx, xy and yy; `right` times xz and yz.
     """
-    n, nx, ny, nz, xx, xy, yy, xz, yz = sums.T
-    first, second = (n.sum(), nx.sum(), ny.sum()), (xx.sum(), xy.sum(), yy.sum())
-    right = nz.sum(), xz.sum(), yz.sum()
+    n, nx, ny, nz = first
     share = 1 / (n + PRIOR_PIXELS * (PIXEL_SD / OFF_LEVEL) ** 2)
+    total = n.sum(), nx.sum(), ny.sum()
+    right = nz.sum(), *right
     a, b, c = solve_plane(
-        tuple(total - (n * part * share).sum() for total, part in zip(first, (n, nx, ny), strict=True)),
+        tuple(t - (n * part * share).sum() for t, part in zip(total, (n, nx, ny), strict=True)),
         (
             second[0] - (nx * nx * share).sum(),
             second[1] - (nx * ny * share).sum(),
             second[2] - (ny * ny * share).sum(),
         ),
-        tuple(total - (nz * part * share).sum() for total, part in zip(right, (n, nx, ny), strict=True)),
+        tuple(t - (nz * part * share).sum() for t, part in zip(right, (n, nx, ny), strict=True)),
         OWN_HEIGHT,
     )
     lifts = (nz - a * n - b * nx - c * ny) * share
     lifts = jnp.where(jnp.abs(lifts) > PLAIN, lifts, 0.0)
-    left = tuple(total - (lifts * part).sum() for total, part in zip(right, (n, nx, ny), strict=True))
-    return solve_plane(first, second, left, PRIOR_OFFSET), tuple(lifts)
+    left = tuple(t - (lifts * part).sum() for t, part in zip(right, (n, nx, ny), strict=True))
+    return solve_plane(total, second, left, PRIOR_OFFSET), tuple(lifts)
 
 
 def solve_plane(
