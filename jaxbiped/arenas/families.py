@@ -78,6 +78,9 @@ def sample(
     layouts = [LAYOUTS[name](u[4:], difficulty, middle, **fixed.get(name, {})) for name in families]
     boxes = replace(jax.tree.map(lambda *leaves: jnp.stack(leaves)[turn], *layouts), contrast=0.5 + 0.5 * u[1])
     boxes = _keep_ends_free(_keep_inside(boxes), start[:2], goal)
+    if population is not None and "bump" in families:
+        bar = (turn == families.index("bump")) & (jnp.arange(MAX_BOXES) == 0) & boxes.used
+        boxes = replace(boxes, top=jnp.where(bar, given_or(population.bump_height, boxes.top), boxes.top))
     traffic = [name in MOVING for name in families]
     movers = _movers(u[4:], boxes, jnp.array(traffic)[turn], population) if any(traffic) else None
     return Arena(

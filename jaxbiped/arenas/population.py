@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from jaxbiped.config import Model
 
 # The family that each field is about.
-FAMILY_OF = {"bump_width": "bump", "bump_length": "bump", "obstacle_speed": "traffic"}
+FAMILY_OF = {"bump_width": "bump", "bump_length": "bump", "bump_height": "bump", "obstacle_speed": "traffic"}
 
 
 class PopulationConfig(Model):
@@ -24,6 +24,8 @@ class PopulationConfig(Model):
     """[m] of the bar of the family `bump` along the way: how far one walks on it. Drawn from 0.15 to 0.45."""
     bump_length: Annotated[float, pydantic.Field(gt=0.0, le=1.4)] | None = None
     """[m] of that bar across the way, which makes the detour round it. Drawn from 0.24 to 1.4, longer where harder."""
+    bump_height: Annotated[float, pydantic.Field(gt=0.0, le=0.5)] | None = None
+    """[m] of that bar. 0.03, one step of the robot, where it is not given."""
     obstacle_speed: Annotated[float, pydantic.Field(ge=0.0, le=1.0)] | None = None
     """[m/s] of the blocks of the family `traffic`. Drawn from 0 to 0.02."""
 
@@ -40,6 +42,7 @@ class Population:
 
     bump_width: Float[Array, "*B"]
     bump_length: Float[Array, "*B"]
+    bump_height: Float[Array, "*B"]
     obstacle_speed: Float[Array, "*B"]
 
 

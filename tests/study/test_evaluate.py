@@ -1,5 +1,7 @@
 """Sweep points in one compiled call: what is compiled, what is drawn, and whether each row is its own mission's."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -88,17 +90,18 @@ def test_two_pitches_compile_twice():
 def test_populations_change_what_they_name_alone():
     drawn, seeds = jax.device_get(draw(jax.random.key(3), jnp.arange(24), FAMILIES))
     fixed = [PopulationConfig(), PopulationConfig(bump_width=0.2), PopulationConfig(bump_width=0.3, bump_length=0.9)]
+    fixed.append(PopulationConfig(bump_height=0.045))
     all_of_them, same = jax.device_get(
         draw(jax.random.key(3), jnp.arange(24), FAMILIES, stack([population.traced() for population in fixed]))
     )
     np.testing.assert_array_equal(seeds, same)
-    default, narrow, both = (
+    default, narrow, both, high = (
         jax.tree.map(lambda leaf, k=k: leaf[24 * k : 24 * k + 24], all_of_them) for k in range(len(fixed))
     )
     for ours, theirs in zip(jax.tree.leaves(default), jax.tree.leaves(drawn), strict=True):
         np.testing.assert_array_equal(ours, theirs)  # bit for bit what is drawn without a population
     bump = drawn.family == FAMILIES.index("bump")
-    for arena in (narrow, both):
+    for arena in (narrow, both, high):
         for ours, theirs in zip(jax.tree.leaves(arena), jax.tree.leaves(drawn), strict=True):
             np.testing.assert_array_equal(ours[~bump], theirs[~bump])
         np.testing.assert_array_equal(arena.start_xyyaw, drawn.start_xyyaw)
@@ -107,3 +110,7 @@ def test_populations_change_what_they_name_alone():
     np.testing.assert_allclose(narrow.boxes.half_y[bump, 0], drawn.boxes.half_y[bump, 0], rtol=0.05)
     np.testing.assert_allclose(2 * both.boxes.half_x[bump, 0], 0.3, rtol=1e-6)
     np.testing.assert_allclose(2 * both.boxes.half_y[bump, 0], 0.9, rtol=1e-6)
+    np.testing.assert_allclose(high.boxes.top[bump, 0], 0.045, rtol=1e-6)
+    high = replace(high, boxes=replace(high.boxes, top=drawn.boxes.top))
+    for ours, theirs in zip(jax.tree.leaves(high), jax.tree.leaves(drawn), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
