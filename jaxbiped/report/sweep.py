@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import polars as pl
 from rich.console import Group
 
 from jaxbiped.errors import InputError
@@ -15,7 +16,7 @@ from jaxbiped.report.figures import saver
 from jaxbiped.report.sweep_figures import sweep_figure
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.report.words import NONE, brackets, number, percent, signed
-from jaxbiped.study import Manifest, PairComparison, read, read_points
+from jaxbiped.study import CODES, Manifest, PairComparison, read, read_points
 from jaxbiped.study.pointwise import PointResult, SweepResult, pointwise
 
 SUMMARY, FIGURE = "summary.md", "sweep.png"
@@ -54,7 +55,7 @@ def write_sweep_report(folder: str | Path, *, resamples: int = 999) -> SweepRepo
     result = pointwise(frame, read_points(folder), manifest.config, seed=manifest.seed, resamples=resamples)
     figure, caption = sweep_figure(result, grid_axes(manifest))
     write_whole(folder / FIGURE, saver(figure))
-    shown, said = sheets(result), sentences(result)
+    shown, said = (*sheets(result), ending_sheet(frame, result.strategies)), sentences(result)
     text = summary(manifest, shown, said, caption)
     write_whole(folder / SUMMARY, lambda file: file.write(text.encode()))
     return SweepReport(folder, result, manifest, shown, said, (folder / SUMMARY, folder / FIGURE))
@@ -101,6 +102,16 @@ def sheets(result: SweepResult) -> tuple[Sheet, ...]:
             title = f"{name}: each point less point {result.reference}, the config's own values"
             made.append(sheet(title, result, columns, (level,)))
     return tuple(made)
+
+
+def ending_sheet(frame: pl.DataFrame, strategies: Sequence[str]) -> Sheet:
+    """How the missions of each strategy ended, of all points together; codes that never came are left out."""
+    counts = dict(frame.group_by(pl.col("strategy", "code").cast(pl.String)).len().rows_by_key(["strategy", "code"]))
+    number_of = {key: found[0][-1] for key, found in counts.items()}
+    seen = [code for code in CODES if any((name, code) in number_of for name in strategies)]
+    rows = tuple((name, *(str(number_of.get((name, code), 0)) for code in seen)) for name in strategies)
+    columns = ("strategy", *(code.replace("_", " ") for code in seen))
+    return Sheet("How missions ended, at all points together", columns, (rows,))
 
 
 def sheet(

@@ -77,6 +77,14 @@ def test_summary_says_what_the_rows_hold(tmp_path):
         line = next(row for row in text.splitlines() if row.startswith(f"| {point.index} |"))
         assert f"{100 * reached:.1f} [" in line
     assert "bump_aware: each point less point 2" in text
+    ended = text.split("### How missions ended")[1].split("###")[0].split("## ")[0]
+    names, *table_rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in ended.splitlines() if "|" in row)
+    for row in table_rows[1:]:  # under the line that aligns columns
+        codes = frame.filter(pl.col("strategy") == row[0])["code"].cast(pl.String).to_list()
+        assert {n.replace(" ", "_"): int(c) for n, c in zip(names[1:], row[1:], strict=True) if c != "0"} == {
+            code: codes.count(code) for code in set(codes)
+        }
+    assert [row[0] for row in table_rows[1:]] == list(PAIR)
     before = text
     write_sweep_report(folder, resamples=99)
     assert (folder / "summary.md").read_text() == before
@@ -152,7 +160,7 @@ def test_points_of_a_study_that_sweeps_nothing(tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "points", "programs"),
-    [("costs", 65, 1), ("resolution", 5, 5), ("noise", 7, 1), ("radius", 8, 1), ("bump", 30, 1)],
+    [("costs", 65, 1), ("resolution", 5, 5), ("noise", 7, 1), ("radius", 8, 1), ("bump", 30, 1), ("heights", 11, 1)],
 )
 def test_shipped_sweeps(request, name, points, programs):
     path = request.config.rootpath / "sweeps" / f"{name}.toml"
