@@ -23,6 +23,40 @@ class Model(pydantic.BaseModel):
 
 M = TypeVar("M", bound=Model)
 
+# What pydantic found wrong, by its name for that, in our words; fields are of its context.
+SAID = {
+    "missing": "must be given",
+    "extra_forbidden": "unknown key",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "multiple_of": "must be a multiple of {multiple_of:g}",
+    "finite_number": "must be finite",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "literal_error": "must be {expected}",
+    "enum": "must be {expected}",
+    "union_tag_invalid": "must be one of {expected_tags}",
+    "union_tag_not_found": "must be given",
+    "too_short": "must have {min_length} items or more",
+    "too_long": "must have {max_length} items or fewer",
+    "string_too_short": "must have {min_length} characters or more",
+    "string_too_long": "must have {max_length} characters or fewer",
+    "string_pattern_mismatch": "must match {pattern}",
+    "int_parsing_size": "is too large",
+} | {
+    name: f"must be {what}"
+    for what, names in {
+        "a number": "float_type float_parsing",
+        "a whole number": "int_type int_parsing int_from_float",
+        "text": "string_type path_type bytes_type string_unicode",
+        "a list": "tuple_type list_type set_type frozen_set_type iterable_type",
+        "a table": "model_type dict_type mapping_type model_attributes_type dataclass_type",
+    }.items()
+    for name in names.split()
+}  # fmt: skip
+
 
 def load_toml(path: str | Path) -> dict[str, Any]:
     """Read a TOML file; raise `InputError` when it is missing, no text or no TOML."""
@@ -63,9 +97,9 @@ def input_error(error: pydantic.ValidationError, *, file: str | Path | None = No
     """The first problem of a pydantic error as one line; a `prefix` makes options of fields."""
     first = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in first["loc"]) or None
-    message = first["msg"].removeprefix("Value error, ")
-    if first["type"] == "extra_forbidden":
-        message = "unknown key"
+    message = first["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
+    if first["type"] in SAID:
+        message = SAID[first["type"]].format(**first.get("ctx", {}))
     value = None if first["type"] == "told" else first["input"]  # whose message says it
     if prefix and field:
         field = prefix + field.removeprefix("mission.").replace("_", "-")

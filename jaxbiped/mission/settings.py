@@ -127,7 +127,8 @@ class MissionConfig(Model):
             data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
         if isinstance(data, dict):
             limits, robot = data.get("limits", {}), data.get("robot", {})
-            bears = limits.get("height_tolerance") if isinstance(limits, dict) else limits.height_tolerance
+            bears = limits.get("height_tolerance") if isinstance(limits, dict) else None
+            bears = getattr(limits, "height_tolerance", bears)  # a config, or something wrong
             if isinstance(robot, dict) and bears is not None:
                 data = data | {"robot": {"height_tolerance": bears} | robot}
         if isinstance(data, dict) and data.get("sensor") == "stereo":

@@ -137,20 +137,20 @@ def test_an_absolute_picture_path(write, tmp_path):
 
 
 BAD_SHEETS = [
-    ({"image": None}, "image: Field required"),
-    ({"resolution": None}, "resolution: Field required"),
-    ({"resolution": 0}, "resolution: Input should be greater than 0 (got 0)"),
-    ({"resolution": -0.05}, "resolution: Input should be greater than 0 (got -0.05)"),
-    ({"resolution": math.nan}, "resolution: Input should be"),
-    ({"resolution": "wide"}, "resolution: Input should be a valid number"),
-    ({"origin": [0.0, 0.0]}, "origin.2: Field required"),
-    ({"origin": [0.0, math.inf, 0.0]}, "origin.1: Input should be a finite number"),
-    ({"negate": 7}, "negate: Input should be a valid boolean"),
-    ({"occupied_thresh": 1.5}, "occupied_thresh: Input should be less than or equal to 1 (got 1.5)"),
-    ({"free_thresh": -0.1}, "free_thresh: Input should be greater than or equal to 0 (got -0.1)"),
+    ({"image": None}, "image: must be given"),
+    ({"resolution": None}, "resolution: must be given"),
+    ({"resolution": 0}, "resolution: must be greater than 0 (got 0)"),
+    ({"resolution": -0.05}, "resolution: must be greater than 0 (got -0.05)"),
+    ({"resolution": math.nan}, "resolution: must be finite"),
+    ({"resolution": "wide"}, "resolution: must be a number"),
+    ({"origin": [0.0, 0.0]}, "origin.2: must be given"),
+    ({"origin": [0.0, math.inf, 0.0]}, "origin.1: must be finite"),
+    ({"negate": 7}, "negate: must be true or false"),
+    ({"occupied_thresh": 1.5}, "occupied_thresh: must be at most 1 (got 1.5)"),
+    ({"free_thresh": -0.1}, "free_thresh: must be at least 0 (got -0.1)"),
     ({"free_thresh": 0.7}, "free_thresh 0.7 must not be above occupied_thresh 0.65"),
-    ({"mode": "quaternary"}, "mode: Input should be 'trinary', 'scale' or 'raw' (got 'quaternary')"),
-    ({"origin": [0.0, 0.0, math.nan]}, "origin.2: Input should be a finite number"),
+    ({"mode": "quaternary"}, "mode: must be 'trinary', 'scale' or 'raw' (got 'quaternary')"),
+    ({"origin": [0.0, 0.0, math.nan]}, "origin.2: must be finite"),
 ]
 
 

@@ -88,7 +88,7 @@ def test_warp_that_is_not_installed():
 
 
 def test_options_of_mjx():
-    with pytest.raises(InputError, match="impl: Input should be 'jax' or 'warp'"):
+    with pytest.raises(InputError, match="impl: must be 'jax' or 'warp'"):
         physics.make("mjx", PENDULUM, 1, impl="cpp")
     with pytest.raises(InputError, match="threads: unknown option; there are block, contacts, device"):
         physics.make("mjx", PENDULUM, 1, threads=1)
