@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped import arenas
-from jaxbiped.arenas import Arena, Movers, Population, PopulationConfig
+from jaxbiped.arenas import Arena, Movers, PopulationConfig
 from tests import fuzzing
 from tests.fuzzing import mapped, same, spoiled
 from tests.sensing.scenes import SLOTS, as_jax, make
@@ -62,7 +62,7 @@ def draw(key, index, population=None):
 
 def same_arena():
     one = draw(KEY, jnp.int32(3))
-    drawn = Population(*(jnp.float32(np.nan),) * 3)
+    drawn = PopulationConfig().traced()
     others = [draw(KEY, index) for index in (3, np.int64(3), np.uint8(3))]
     return same(one, *others, draw(jax.random.key_data(KEY), 3), draw(KEY, jnp.int32(3), drawn))
 

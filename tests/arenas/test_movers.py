@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.arenas import KNOWN, Population, at_time, only, sample
+from jaxbiped.arenas import KNOWN, PopulationConfig, at_time, only, sample
 from jaxbiped.arenas.families import CLEARANCE, SIZE_X, SIZE_Y
 from jaxbiped.arenas.movers import boxes_at
 
@@ -64,8 +64,7 @@ def test_they_stay_inside_and_clear_of_start_and_goal(traffic):
 
 
 def test_speed_is_fixed_by_the_population_and_nothing_else_changes(traffic):
-    nan = jnp.float32(np.nan)
-    fixed = draw(("traffic",), Population(nan, nan, jnp.float32(0.005)))
+    fixed = draw(("traffic",), PopulationConfig(obstacle_speed=0.005).traced())
     np.testing.assert_array_equal(fixed.movers.speed[np.asarray(fixed.boxes.used)], np.float32(0.005))
     for a, b in zip(jax.tree.leaves(fixed.boxes), jax.tree.leaves(traffic.boxes), strict=True):
         np.testing.assert_array_equal(a, b)
