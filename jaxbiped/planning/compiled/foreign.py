@@ -14,6 +14,8 @@ import numpy as np
 from numba import carray, cfunc, njit, types
 from numba.extending import intrinsic
 
+from jaxbiped.planning.compiled import objects
+
 # Places of the fields, in words of 8 bytes from the beginning of their structure.
 FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULTS = 1, 7, 9, 14
 BUFFER_DATA, BUFFER_SHAPE = 3, 5
@@ -74,24 +76,55 @@ def expect(array, shape: tuple[int, ...], dtype) -> None:
         raise ValueError(f"a kernel wants {np.dtype(dtype).name} {list(shape)}, not {array.dtype} {list(array.shape)}")
 
 
-def register(name: str, function) -> None:
+def register(name: str, function, *, keep: bool = False) -> None:
     """Make `function(arguments, count, results)`, a Numba function, callable as `jax.ffi.ffi_call(name, ...)`.
 
     It gets the addresses of the lists of its arguments and results, for `data` and `shape`, and the number of its
     arguments. It must not raise: there is nobody to catch.
+
+    Args:
+      keep: on disk, as the one function of this name (`compiled.objects`).
     """
+    address = objects.load(name) if keep else None
+    if address is None:
 
-    @cfunc(types.uint64(types.CPointer(types.uint64)))
-    def handler(call):
-        frame = carray(call, (FRAME_RESULTS + 1,))
-        if not answered(frame):
-            function(frame[FRAME_ARGUMENTS], frame[FRAME_ARGUMENT_COUNT], frame[FRAME_RESULTS])
-        return 0  # no error
+        @cfunc(types.uint64(types.CPointer(types.uint64)))
+        def handler(call):
+            frame = carray(call, (FRAME_RESULTS + 1,))
+            if not answered(frame):
+                function(frame[FRAME_ARGUMENTS], frame[FRAME_ARGUMENT_COUNT], frame[FRAME_RESULTS])
+            return 0  # no error
 
-    HANDLERS[name] = handler  # kept: XLA holds its address
+        HANDLERS[name] = handler  # kept: XLA holds its address
+        address = handler.address
+        if keep:
+            objects.store(name, handler)
+    ADDRESSES[name] = address
     new = ctypes.pythonapi.PyCapsule_New
     new.restype, new.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
-    jax.ffi.register_ffi_target(name, new(handler.address, None, None), platform="cpu")
+    jax.ffi.register_ffi_target(name, new(address, None, None), platform="cpu")
 
 
 HANDLERS: dict = {}
+ADDRESSES: dict = {}
+CALL = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p)
+
+
+def call(name: str, arguments, results) -> None:
+    """Call a registered function as XLA would, with contiguous NumPy arrays. Other threads run meanwhile."""
+
+    def listed(arrays):
+        shapes = [np.array(array.shape, np.int64) for array in arrays]
+        buffers = np.zeros((len(arrays), BUFFER_SHAPE + 1), np.uint64)
+        buffers[:, BUFFER_DATA] = [array.ctypes.data for array in arrays]
+        buffers[:, BUFFER_SHAPE] = [shape.ctypes.data for shape in shapes]
+        return [buffer.ctypes.data for buffer in buffers], (shapes, buffers)
+
+    given, held = listed(arguments)
+    made, held_too = listed(results)
+    given, made = np.array(given, np.uint64), np.array(made, np.uint64)
+    frame = np.zeros(FRAME_RESULTS + 1, np.uint64)
+    frame[FRAME_ARGUMENTS], frame[FRAME_RESULTS] = given.ctypes.data, made.ctypes.data
+    frame[FRAME_ARGUMENT_COUNT] = len(arguments)
+    CALL(ADDRESSES[name])(frame.ctypes.data)
+    del held, held_too  # until here they must live

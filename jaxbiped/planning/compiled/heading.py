@@ -91,7 +91,7 @@ def solve(arguments, count, results):
 def registered(method: str) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
     name = f"jaxbiped_heading_{method}"
-    foreign.register(name, solve if method == "dijkstra" else sweep.solver())
+    foreign.register(name, solve if method == "dijkstra" else sweep.solver(), keep=True)
     return name, 1 if method == "dijkstra" else sweep.LANES
 
 

@@ -79,9 +79,10 @@ def registered(kernel: str) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
     name, lanes = f"jaxbiped_{kernel}", 1 if kernel == "dijkstra" else LANES
     if kernel == GRIDS:
-        foreign.register(name, grids.solver())
+        foreign.register(name, grids.solver(), keep=True)
     else:
-        foreign.register(name, solver(dijkstra.settle if kernel == "dijkstra" else line_sweep.sweeps(lanes), lanes))
+        settle = dijkstra.settle if kernel == "dijkstra" else line_sweep.sweeps(lanes)
+        foreign.register(name, solver(settle, lanes), keep=True)
     return name, lanes
 
 
@@ -154,10 +155,9 @@ def settle_arrays(tables, classes, levels, goal_ij, cost, steps, settled) -> Non
     if batch < LANES or not all(array.flags.c_contiguous for array in (*inputs, cost, steps, settled)):
         raise ValueError(f"needs at least {LANES} arenas, in contiguous arrays")
     size = grids.room_size(height, width)
-    grids.settler()(
-        classes.ravel(), levels.ravel(), *(table.ravel() for table in tables), goal_ij, cost.ravel(), steps, settled,
-        aligned(size, np.float64), aligned(4 * size, np.float32), aligned(3 * size, np.int8), height, width,
-    )  # fmt: skip
+    name, _ = target(GRIDS)
+    room = aligned(size, np.float64), aligned(4 * size, np.float32), aligned(3 * size, np.int8)
+    foreign.call(name, inputs, (cost, steps, settled, *room))
 
 
 def aligned(shape, dtype) -> np.ndarray:

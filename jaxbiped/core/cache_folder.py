@@ -1,0 +1,26 @@
+"""Where compiled programs are kept on disk between processes: under the user's cache folder."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+VARIABLE = "JAXBIPED_CACHE"  # a folder, or "off"
+OFF = "off"
+
+
+def cache_folder() -> Path | None:
+    """The folder, which need not exist; None where nothing is to be kept."""
+    asked = os.environ.get(VARIABLE, "").strip()
+    if asked.lower() == OFF:
+        return None
+    if asked:
+        return Path(asked).expanduser()
+    try:
+        home = Path.home()
+    except RuntimeError:  # a process without a home
+        return None
+    if sys.platform == "darwin":
+        return home / "Library" / "Caches" / "jaxbiped"
+    return Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache") / "jaxbiped"

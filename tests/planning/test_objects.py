@@ -1,0 +1,158 @@
+"""Kernels kept on disk: the same functions, loaded; and whatever is wrong with the disk, compiled anew."""
+
+import os
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from numba import njit
+
+from jaxbiped.core.cache_folder import VARIABLE, cache_folder
+from jaxbiped.planning.compiled import foreign, objects
+
+NAME = "jaxbiped_test_doubled"
+
+
+@njit
+def doubled(arguments, count, results):
+    size = foreign.shape(arguments, 0)[0]
+    given = foreign.array(arguments, 0, size, np.float64)
+    room = np.zeros(size)  # of Numba's own runtime
+    for i in range(size):
+        room[i] = 2 * given[i] + count
+    foreign.array(results, 0, size, np.float64)[:] = room
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
+    yield tmp_path / "cache" / "kernels" / objects.key()
+    for known in (foreign.HANDLERS, foreign.ADDRESSES):
+        known.pop(NAME, None)
+
+
+def answer():
+    given, made = np.arange(5.0), np.zeros(5)
+    foreign.call(NAME, (given,), (made,))
+    return made.tolist()
+
+
+def test_what_is_kept_is_the_same_function(folder):
+    foreign.register(NAME, doubled, keep=True)
+    compiled = answer()
+    assert compiled == [1, 3, 5, 7, 9] and [file.name for file in folder.iterdir()] == [NAME]
+    address = objects.load(NAME)
+    assert address and address != foreign.ADDRESSES[NAME]
+    foreign.ADDRESSES[NAME] = address
+    assert answer() == compiled
+    foreign.HANDLERS.clear()
+    foreign.register(NAME, None, keep=True)  # nothing is left to compile
+    assert answer() == compiled and NAME not in foreign.HANDLERS
+
+
+def test_a_damaged_file_is_none(folder):
+    assert objects.load(NAME) is None
+    foreign.register(NAME, doubled, keep=True)
+    whole = (folder / NAME).read_bytes()
+    other = bytes([whole[-1] ^ 1])
+    wrong = [whole[:n] for n in (0, 1, 17, 18, 49, 50, 51, 200, len(whole) // 2, len(whole) - 1)]
+    wrong += [
+        whole + b"x",
+        whole[:-1] + other,
+        b"x" + whole[1:],
+        whole.replace(b"kernel 1", b"kernel 2"),
+        os.urandom(999),
+    ]
+    for data in wrong:
+        (folder / NAME).write_bytes(data)
+        assert objects.load(NAME) is None
+    foreign.register(NAME, doubled, keep=True)
+    assert (
+        answer() == [1, 3, 5, 7, 9]
+        and (folder / NAME).read_bytes()[:50] == whole[:18] + (folder / NAME).read_bytes()[18:50]
+    )
+    assert objects.load(NAME)
+    (folder / NAME).unlink()
+    (folder / NAME).mkdir()
+    assert objects.load(NAME) is None
+
+
+def test_without_a_folder_it_works_all_the_same(folder, tmp_path, monkeypatch):
+    for value in ("off", "OFF"):
+        monkeypatch.setenv(VARIABLE, value)
+        assert cache_folder() is None
+    foreign.register(NAME, doubled, keep=True)
+    assert answer() == [1, 3, 5, 7, 9] and list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("no folder")
+    for wrong in (tmp_path / "file", tmp_path / "file" / "below", "/proc/none"):
+        monkeypatch.setenv(VARIABLE, str(wrong))
+        foreign.register(NAME, doubled, keep=True)
+        assert answer() == [1, 3, 5, 7, 9] and objects.load(NAME) is None
+
+
+def test_a_changed_source_has_another_key(tmp_path, monkeypatch):
+    shutil.copytree(objects.PLANNING, tmp_path / "planning")
+    monkeypatch.setattr(objects, "SOURCES", (tmp_path / "planning",))
+    first = objects.key.__wrapped__()
+    assert first == objects.key.__wrapped__()
+    with (tmp_path / "planning" / "costs.py").open("a") as file:
+        file.write("#")
+    assert objects.key.__wrapped__() != first
+
+
+def test_only_the_last_versions_stay(folder):
+    for k in range(objects.OLDEST + 4):
+        old = folder.parent / f"old{k}"
+        old.mkdir(parents=True)
+        (old / "kernel").write_text("x")
+        os.utime(old, (1000 + k, 1000 + k))
+    foreign.register(NAME, doubled, keep=True)
+    left = {f.name for f in folder.parent.iterdir()}
+    assert (
+        len(left) == objects.OLDEST
+        and folder.name in left
+        and "old0" not in left
+        and f"old{objects.OLDEST + 3}" in left
+    )
+
+
+def test_many_at_once(folder):
+    foreign.register(NAME, doubled, keep=True)
+    handler = foreign.HANDLERS[NAME]
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda _: objects.store(NAME, handler), range(40)))
+    assert [file.name for file in folder.iterdir()] == [NAME] and objects.load(NAME)
+
+
+PROGRAM = """
+import sys
+import numpy as np
+from jaxbiped import planning
+from jaxbiped.planning.compiled import foreign
+
+classes, levels = np.ones((1, 9, 12), np.int8), np.zeros((1, 9, 12), np.int8)
+classes[0, 3, 2:9], classes[0, 5:7, 4:8], levels[0, 5:7, 4:8] = 4, 2, 1
+for method in sys.argv[1:]:
+    found = planning.field(classes, levels, goal_ij=[[7, 3]], method=method)
+    print(method, bool(found.converged.all()), np.asarray(found.cost).tobytes().hex())
+many = planning.field(np.repeat(classes, 40, 0), np.repeat(levels, 40, 0), goal_ij=[[7, 3]] * 40)
+edges = planning.edge_costs(classes, levels)
+for method in sys.argv[1:]:
+    print(np.asarray(planning.cost_to_go(edges, [[7, 3]], method).cost).tobytes().hex())
+    headings = planning.heading_field(classes, levels, goal_ij=[[7, 3]], method=method)
+    print(bool(headings.converged.all()), np.asarray(headings.cost).tobytes().hex())
+print(many.cost[39].tobytes().hex())
+print("compiled", len(foreign.HANDLERS), "of", len(foreign.ADDRESSES))
+"""
+
+
+def test_the_next_process_compiles_no_kernel():
+    """Of those of the suite, which all processes share."""
+    words = [sys.executable, "-c", PROGRAM, "line_sweep", "dijkstra"]
+    first, second = (
+        subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines() for _ in range(2)
+    )
+    assert second[-1] == "compiled 0 of 6" and first[-1].endswith("of 6") and first[:-1] == second[:-1]
