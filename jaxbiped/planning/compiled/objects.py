@@ -85,7 +85,10 @@ def sweep_up(parent: Path) -> None:
 def kernel_folder() -> Path | None:
     """The folder of this program's kernels on this kind of processor; None where none are kept."""
     folder = cache_folder()
-    return folder / "kernels" / key() if folder else None
+    try:
+        return folder / "kernels" / key() if folder else None
+    except OSError:  # sources that cannot be read
+        return None
 
 
 @cache
