@@ -41,21 +41,21 @@ def answer():
 
 
 def test_what_is_kept_is_the_same_function(folder):
-    foreign.register(NAME, doubled, keep=True)
+    foreign.compile_handler(NAME, doubled, keep=True)
     compiled = answer()
     assert compiled == [1, 3, 5, 7, 9] and [file.name for file in folder.iterdir()] == [NAME]
     address = objects.load(NAME)
     assert address and address != foreign.ADDRESSES[NAME]
     foreign.ADDRESSES[NAME] = address
     assert answer() == compiled
-    foreign.HANDLERS.clear()
-    foreign.register(NAME, None, keep=True)  # nothing is left to compile
+    del foreign.HANDLERS[NAME]
+    foreign.compile_handler(NAME, None, keep=True)  # nothing is left to compile
     assert answer() == compiled and NAME not in foreign.HANDLERS
 
 
 def test_a_damaged_file_is_none(folder):
     assert objects.load(NAME) is None
-    foreign.register(NAME, doubled, keep=True)
+    foreign.compile_handler(NAME, doubled, keep=True)
     whole = (folder / NAME).read_bytes()
     other = bytes([whole[-1] ^ 1])
     wrong = [whole[:n] for n in (0, 1, 17, 18, 49, 50, 51, 200, len(whole) // 2, len(whole) - 1)]
@@ -69,7 +69,7 @@ def test_a_damaged_file_is_none(folder):
     for data in wrong:
         (folder / NAME).write_bytes(data)
         assert objects.load(NAME) is None
-    foreign.register(NAME, doubled, keep=True)
+    foreign.compile_handler(NAME, doubled, keep=True)
     assert (
         answer() == [1, 3, 5, 7, 9]
         and (folder / NAME).read_bytes()[:50] == whole[:18] + (folder / NAME).read_bytes()[18:50]
@@ -84,12 +84,12 @@ def test_without_a_folder_it_works_all_the_same(folder, tmp_path, monkeypatch):
     for value in ("off", "OFF"):
         monkeypatch.setenv(VARIABLE, value)
         assert cache_folder() is None
-    foreign.register(NAME, doubled, keep=True)
+    foreign.compile_handler(NAME, doubled, keep=True)
     assert answer() == [1, 3, 5, 7, 9] and list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("no folder")
     for wrong in (tmp_path / "file", tmp_path / "file" / "below", "/proc/none"):
         monkeypatch.setenv(VARIABLE, str(wrong))
-        foreign.register(NAME, doubled, keep=True)
+        foreign.compile_handler(NAME, doubled, keep=True)
         assert answer() == [1, 3, 5, 7, 9] and objects.load(NAME) is None
 
 
@@ -109,7 +109,7 @@ def test_only_the_last_versions_stay(folder):
         old.mkdir(parents=True)
         (old / "kernel").write_text("x")
         os.utime(old, (1000 + k, 1000 + k))
-    foreign.register(NAME, doubled, keep=True)
+    foreign.compile_handler(NAME, doubled, keep=True)
     left = {f.name for f in folder.parent.iterdir()}
     assert (
         len(left) == objects.OLDEST
@@ -120,7 +120,7 @@ def test_only_the_last_versions_stay(folder):
 
 
 def test_many_at_once(folder):
-    foreign.register(NAME, doubled, keep=True)
+    foreign.compile_handler(NAME, doubled, keep=True)
     handler = foreign.HANDLERS[NAME]
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(lambda _: objects.store(NAME, handler), range(40)))

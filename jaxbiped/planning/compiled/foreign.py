@@ -77,7 +77,7 @@ def expect(array, shape: tuple[int, ...], dtype) -> None:
 
 
 def register(name: str, function, *, keep: bool = False) -> None:
-    """Make `function(arguments, count, results)`, a Numba function, callable as `jax.ffi.ffi_call(name, ...)`.
+    """Make `function(arguments, count, results)`, a Numba function, callable as `jax.ffi.ffi_call(name, ...)`, once.
 
     It gets the addresses of the lists of its arguments and results, for `data` and `shape`, and the number of its
     arguments. It must not raise: there is nobody to catch.
@@ -85,6 +85,13 @@ def register(name: str, function, *, keep: bool = False) -> None:
     Args:
       keep: on disk, as the one function of this name (`compiled.objects`).
     """
+    new = ctypes.pythonapi.PyCapsule_New
+    new.restype, new.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
+    jax.ffi.register_ffi_target(name, new(compile_handler(name, function, keep), None, None), platform="cpu")
+
+
+def compile_handler(name: str, function, keep: bool) -> int:
+    """The address of the function that XLA is to call, from the disk where it is kept there; for `call` as well."""
     address = objects.load(name) if keep else None
     if address is None:
 
@@ -100,9 +107,7 @@ def register(name: str, function, *, keep: bool = False) -> None:
         if keep:
             objects.store(name, handler)
     ADDRESSES[name] = address
-    new = ctypes.pythonapi.PyCapsule_New
-    new.restype, new.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
-    jax.ffi.register_ffi_target(name, new(address, None, None), platform="cpu")
+    return address
 
 
 HANDLERS: dict = {}
@@ -111,7 +116,7 @@ CALL = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p)
 
 
 def call(name: str, arguments, results) -> None:
-    """Call a registered function as XLA would, with contiguous NumPy arrays. Other threads run meanwhile."""
+    """Call a compiled function as XLA would, with contiguous NumPy arrays. Other threads run meanwhile."""
 
     def listed(arrays):
         shapes = [np.array(array.shape, np.int64) for array in arrays]
