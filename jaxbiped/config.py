@@ -25,12 +25,12 @@ M = TypeVar("M", bound=Model)
 
 # What pydantic found wrong, by its name for that, in our words; fields are of its context.
 SAID = {
-    "missing": "must be given",
+    "missing": "is required",
     "extra_forbidden": "unknown key",
     "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be at least {ge:g}",
+    "greater_than_equal": "must be greater than or equal to {ge:g}",
     "less_than": "must be less than {lt:g}",
-    "less_than_equal": "must be at most {le:g}",
+    "less_than_equal": "must be less than or equal to {le:g}",
     "multiple_of": "must be a multiple of {multiple_of:g}",
     "finite_number": "must be finite",
     "bool_type": "must be true or false",
@@ -38,11 +38,11 @@ SAID = {
     "literal_error": "must be {expected}",
     "enum": "must be {expected}",
     "union_tag_invalid": "must be one of {expected_tags}",
-    "union_tag_not_found": "must be given",
-    "too_short": "must have {min_length} items or more",
-    "too_long": "must have {max_length} items or fewer",
-    "string_too_short": "must have {min_length} characters or more",
-    "string_too_long": "must have {max_length} characters or fewer",
+    "union_tag_not_found": "is required",
+    "too_short": "must have at least {min_length} item(s)",
+    "too_long": "must have at most {max_length} item(s)",
+    "string_too_short": "must have at least {min_length} character(s)",
+    "string_too_long": "must have at most {max_length} character(s)",
     "string_pattern_mismatch": "must match {pattern}",
     "int_parsing_size": "is too large",
 } | {
@@ -50,7 +50,7 @@ SAID = {
     for what, names in {
         "a number": "float_type float_parsing",
         "a whole number": "int_type int_parsing int_from_float",
-        "text": "string_type path_type bytes_type string_unicode",
+        "a string": "string_type path_type bytes_type string_unicode",
         "a list": "tuple_type list_type set_type frozen_set_type iterable_type",
         "a table": "model_type dict_type mapping_type model_attributes_type dataclass_type",
     }.items()

@@ -137,17 +137,17 @@ def test_an_absolute_picture_path(write, tmp_path):
 
 
 BAD_SHEETS = [
-    ({"image": None}, "image: must be given"),
-    ({"resolution": None}, "resolution: must be given"),
+    ({"image": None}, "image: is required"),
+    ({"resolution": None}, "resolution: is required"),
     ({"resolution": 0}, "resolution: must be greater than 0 (got 0)"),
     ({"resolution": -0.05}, "resolution: must be greater than 0 (got -0.05)"),
     ({"resolution": math.nan}, "resolution: must be finite"),
     ({"resolution": "wide"}, "resolution: must be a number"),
-    ({"origin": [0.0, 0.0]}, "origin.2: must be given"),
+    ({"origin": [0.0, 0.0]}, "origin.2: is required"),
     ({"origin": [0.0, math.inf, 0.0]}, "origin.1: must be finite"),
     ({"negate": 7}, "negate: must be true or false"),
-    ({"occupied_thresh": 1.5}, "occupied_thresh: must be at most 1 (got 1.5)"),
-    ({"free_thresh": -0.1}, "free_thresh: must be at least 0 (got -0.1)"),
+    ({"occupied_thresh": 1.5}, "occupied_thresh: must be less than or equal to 1 (got 1.5)"),
+    ({"free_thresh": -0.1}, "free_thresh: must be greater than or equal to 0 (got -0.1)"),
     ({"free_thresh": 0.7}, "free_thresh 0.7 must not be above occupied_thresh 0.65"),
     ({"mode": "quaternary"}, "mode: must be 'trinary', 'scale' or 'raw' (got 'quaternary')"),
     ({"origin": [0.0, 0.0, math.nan]}, "origin.2: must be finite"),

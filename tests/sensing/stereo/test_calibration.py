@@ -203,7 +203,7 @@ def test_absurd_values_are_named(tmp_path, change, words):
 
 def test_missing_values_are_named(tmp_path):
     path = written(tmp_path, toml({key: value for key, value in GOOD.items() if key != "baseline"}))
-    with pytest.raises(InputError, match=r"camera.toml: baseline: must be given"):
+    with pytest.raises(InputError, match=r"camera.toml: baseline: is required"):
         load_rig(path, SHAPE)
 
 
