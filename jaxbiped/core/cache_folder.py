@@ -15,11 +15,11 @@ def cache_folder() -> Path | None:
     asked = os.environ.get(VARIABLE, "").strip()
     if asked.lower() == OFF:
         return None
-    if asked:
-        return Path(asked).expanduser()
     try:
+        if asked:
+            return Path(asked).expanduser()
         home = Path.home()
-    except RuntimeError:  # a process without a home
+    except RuntimeError:  # a process without a home, or a user who is not known
         return None
     if sys.platform == "darwin":
         return home / "Library" / "Caches" / "jaxbiped"

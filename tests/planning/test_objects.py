@@ -87,7 +87,7 @@ def test_without_a_folder_it_works_all_the_same(folder, tmp_path, monkeypatch):
     foreign.compile_handler(NAME, doubled, keep=True)
     assert answer() == [1, 3, 5, 7, 9] and list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("no folder")
-    for wrong in (tmp_path / "file", tmp_path / "file" / "below", "/proc/none"):
+    for wrong in (tmp_path / "file", tmp_path / "file" / "below", "/proc/none", "~nobody_of_this_name/x"):
         monkeypatch.setenv(VARIABLE, str(wrong))
         foreign.compile_handler(NAME, doubled, keep=True)
         assert answer() == [1, 3, 5, 7, 9] and objects.load(NAME) is None
