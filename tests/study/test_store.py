@@ -207,7 +207,7 @@ def test_manifests_that_cannot_be_read_are_named(tmp_path, finished):
         (manifest.read_text()[:40], "manifest.json: is not valid JSON"),
         (json.dumps(data | {"format": 2}), r"reads manifests of format 1 \(got 2\)"),
         (json.dumps([1]), "reads manifests of format 1"),
-        (json.dumps(data | {"seed": "three"}), r"manifest.json: seed: .*integer"),
+        (json.dumps(data | {"seed": "three"}), r"manifest.json: seed: .*whole number"),
         (json.dumps(data | {"colour": 1}), "manifest.json: colour: unknown key"),
     ]:
         manifest.write_text(text)
