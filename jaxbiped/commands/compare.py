@@ -8,20 +8,20 @@ from typing import Annotated, Literal
 import pydantic
 from rich.console import Console
 
-from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.commands.engine import EngineArgs, engine
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
-from jaxbiped.mission.settings import SIMULATED, program
 from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import terminal
 from jaxbiped.study.comparison import default_pairs
+from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.conduct import conduct, never
-from jaxbiped.study.config import StrategyName, StudyConfig
-from jaxbiped.study.groups import shards
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.groups import group_points, only_point, shards, strategies_of
 from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.runner import check_mission
 from jaxbiped.study.sequential import MEASURES, Goal
 from jaxbiped.study.stopping import Rule
 
@@ -42,9 +42,9 @@ class CompareArgs(EngineArgs, StudyConfig):
     look. `--arenas` is then the most, `--shard` how many between looks."""
     measure: Literal[MEASURES] = "success"
     """Whose difference `--until-width` is about."""
-    first: StrategyName | None = None
+    first: str | None = None
     """Of that difference: first minus second; by default the pair that the report is about."""
-    second: StrategyName | None = None
+    second: str | None = None
 
 
 def main(args: CompareArgs) -> int:
@@ -57,23 +57,25 @@ def main(args: CompareArgs) -> int:
       InputError: a config that cannot be run, a folder that exists or cannot be written, a full disk.
     """
     config = StudyConfig.model_validate(args.model_dump(include=set(StudyConfig.model_fields)))
-    goal = goal_of(args, config)
-    program(config.mission, (SIZE_X, SIZE_Y))  # refuses what does not fit before anything is written
-    if config.mission.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
-
-        rehearse(config.mission)
+    config = fingerprinted(config)
+    groups = group_points(only_point(config), strategies_of(config))  # refuses what does not fit before all else
+    strategies = tuple(item.name for item in strategies_of(config))
+    goal = goal_of(args, strategies)
+    check_mission(config.mission)
     try_eyes(config.mission)
     out = args.out or Path("results") / f"compare-{config_hash(config)}"
     if not args.resume:
         refuse_taken(out)
     console = Console()
-    names = ", ".join(config.strategies)
+    names = ", ".join(strategies)
     console.print(
         f"{config.arenas} arenas, seed {config.seed}, sensor {config.mission.sensor}: {names}", highlight=False
     )
     enough = Rule(goal, out, config.arenas) if goal else never
-    with engine(args, console, len(shards(config, 1)), ordered=goal is not None) as how, progress(console) as show:
+    with (
+        engine(args, console, len(shards(config, len(groups))), ordered=goal is not None) as how,
+        progress(console) as show,
+    ):
         manifest = conduct(out, config, resume=args.resume, on_progress=show, enough=enough, **how)
     report = write_report(out)
     console.print(terminal(report.comparison))
@@ -85,7 +87,7 @@ def main(args: CompareArgs) -> int:
     return 0
 
 
-def goal_of(args: CompareArgs, config: StudyConfig) -> Goal | None:
+def goal_of(args: CompareArgs, strategies: tuple[str, ...]) -> Goal | None:
     """What is watched; InputError where the difference is none of this study's."""
     chosen = {"first": args.first, "second": args.second}
     if args.until_width is None:
@@ -93,15 +95,15 @@ def goal_of(args: CompareArgs, config: StudyConfig) -> Goal | None:
             if chosen[name]:
                 raise InputError("goes with --until-width, or with a results folder", field=name, value=chosen[name])
         return None
-    usual = next(iter(default_pairs(config.strategies)), None)
+    usual = next(iter(default_pairs(strategies)), None)
     for name, other in (("first", "second"), ("second", "first")):
         strategy = chosen[name]
-        if (strategy and strategy not in config.strategies) or usual is None:
-            message = f"must be one of the strategies, which are {', '.join(config.strategies)}, and needs another"
+        if (strategy and strategy not in strategies) or usual is None:
+            message = f"must be one of the strategies, which are {', '.join(strategies)}, and needs another"
             raise InputError(message, field=name, value=strategy)
         if strategy and strategy == chosen[other]:
             raise InputError("must differ from the other side", field=name, value=strategy)
-    rest = [name for name in (*usual, *config.strategies) if name not in chosen.values()]
+    rest = [name for name in (*usual, *strategies) if name not in chosen.values()]
     first, second = (chosen[name] or rest.pop(0) for name in ("first", "second"))
     if args.measure == "success" and args.until_width >= 2:
         raise InputError(

@@ -27,9 +27,10 @@ from jaxbiped.study.reproduction import EXPERIMENTS, PUBLISHED, fit_measuring
 from jaxbiped.study.reproduction.findings import Findings
 from jaxbiped.study.reproduction.gather import MISSIONS, experiment, lintel, mishaps, shortest, strategies
 from jaxbiped.study.reproduction.saved import always, population, study
-from jaxbiped.study.reproduction.staging import load_scenes, seeing
+from jaxbiped.study.reproduction.staging import load_scenes
 from jaxbiped.study.reproduction.table_1 import SCENES
 from jaxbiped.study.reproduction.table_2 import NAMES, verify_all
+from jaxbiped.study.runner import seeing
 from jaxbiped.terminal import command_line
 
 

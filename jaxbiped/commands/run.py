@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import math
 import sys
-from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import jax
 import pydantic
@@ -16,15 +15,16 @@ import tyro
 from jaxbiped.arenas import load_scene, scene_warnings
 from jaxbiped.config import Model, config_hash
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.mission.eyes import eyes_for
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recording import FILE, save_log
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
-from jaxbiped.mission.stepped import Mission, run_logged
-from jaxbiped.mission.strategies import STRATEGIES
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.stepped import Mission
+from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.report.animation import save_gif
 from jaxbiped.report.pictures import save_mission
 from jaxbiped.sensing.hashing import from_key
+from jaxbiped.study.config import StrategyName
+from jaxbiped.study.runner import check_mission, play_one, program_for, seeing
 
 NOT_REACHED = 1  # exit status
 
@@ -34,7 +34,9 @@ class RunArgs(Model):
 
     scene: tyro.conf.Positional[Path]
     """The scene, a TOML file; the paper's six are in configs/scenes."""
-    strategy: Literal[tuple(STRATEGIES)] = "full"
+    strategy: StrategyName = "full"
+    """What the robot dares: full, bump_aware (no gates), gate_aware (no bumps), floor_only, or blind_stop, which walks
+    straight ahead; or package.module:name of your own."""
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
     """Of all noise."""
     out: Path | None = None
@@ -53,29 +55,27 @@ def main(args: RunArgs) -> int:
         exists or cannot be written.
     """
     identity = config_hash(args.model_copy(update={"out": None}))
-    out = args.out or Path("results") / f"run-{args.scene.stem}-{args.strategy}-{identity}"
+    out = args.out or Path("results") / f"run-{args.scene.stem}-{args.strategy.replace(':', '.')}-{identity}"
     refuse_existing(out)
     name, arena = load_scene(args.scene)
-    static = program(args.mission, tuple(round(float(v), 6) for v in arena.size_xy))
+    static = program_for(args.mission, arena)
     for text in scene_warnings(arena, args.mission.robot, static.spec.level_height):
         print(f"jaxbiped: warning: {args.scene}: {text}", file=sys.stderr)
-    play = run_logged
-    if args.mission.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse, walk_logged  # loads MuJoCo
-
-        rehearse(args.mission)
-        play = partial(walk_logged, config=args.mission.walk)
-    eyes = eyes_for(args.mission)
-    print(f"{name}, {args.strategy}, sensor {args.mission.sensor}, executor {args.mission.executor}, seed {args.seed}")
-    print("   time   turn   ahead  primitive")
-    mission = play(
-        arena,
-        args.mission.settings(args.strategy),
-        from_key(jax.random.key(args.seed)),
-        static,
-        on_decision=lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
-        eyes=eyes,
-    )
+    strategy = find_strategy(args.strategy)
+    check_mission(args.mission)
+    with seeing(args.mission) as eyes:
+        print(
+            f"{name}, {strategy.name}, sensor {args.mission.sensor}, executor {args.mission.executor}, seed {args.seed}"
+        )
+        print("   time   turn   ahead  primitive")
+        mission = play_one(
+            arena,
+            args.mission,
+            strategy,
+            from_key(jax.random.key(args.seed)),
+            lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
+            eyes,
+        )
     with new_folder(out) as folder:
         title = f"{name}, {args.strategy}: {sentence(mission)}"
         save_mission(folder / "map.png", mission.log, title=title)

@@ -20,7 +20,6 @@ from jaxbiped.report.stored import equivalence_sheets, plan_sentences, terminal_
 from jaxbiped.report.summary import LIMITATIONS, question
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.study import Comparison
-from jaxbiped.study.config import StrategyName
 from jaxbiped.study.equivalence import equivalences
 from jaxbiped.study.pilot import plan
 from jaxbiped.study.sides import Side, choose, compare_sides, open_stored
@@ -35,9 +34,9 @@ class StoredArgs(Model):
 
     folders: tyro.conf.Positional[Annotated[tuple[Path, ...], pydantic.Field(min_length=1, max_length=2)]]
     """One results folder, or two on the same arenas: the first side is then of the first."""
-    first: StrategyName | None = None
+    first: str | None = None
     """Strategy of the first side. Differences are first minus second."""
-    second: StrategyName | None = None
+    second: str | None = None
     first_point: Annotated[int, pydantic.Field(ge=0)] | None = None
     """Sweep point of the first side; default 0."""
     second_point: Annotated[int, pydantic.Field(ge=0)] | None = None

@@ -12,14 +12,15 @@ from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
-from jaxbiped.mission.settings import SIMULATED
 from jaxbiped.report.sweep import terminal, write_sweep_report
 from jaxbiped.report.sweep_page import write_sweep_page
+from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.evaluate import WORKERS
-from jaxbiped.study.groups import group_points, shards
+from jaxbiped.study.groups import group_points, shards, strategies_of
 from jaxbiped.study.memory import check_memory
 from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.runner import check_mission
 from jaxbiped.study.sweep import SweepConfig
 
 
@@ -50,16 +51,15 @@ def main(args: SweepArgs) -> int:
             "a sweep needs [[axes]] or [sobol] in its file: jaxbiped sweep sweeps/costs.toml", field="axes"
         )
     points = tuple(config.points())
-    groups = group_points(points, config.strategies)
+    config = fingerprinted(config)
+    strategies = strategies_of(config)
+    groups = group_points(points, strategies)
     for group in groups:
         arenas = min(config.shard, config.arenas)
         queues = max(WORKERS, jax.local_device_count())
-        check_memory(group.static, len(group.points), len(config.strategies), arenas, queues)
-    if config.mission.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
-
-        for point in points:
-            rehearse(point.mission)
+        check_memory(group.static, len(group.points), len(group.strategies), arenas, queues)
+    for point in points:
+        check_mission(point.mission)
     try_eyes(config.mission)
     out = args.out or Path("results") / f"sweep-{config_hash(config)}"
     if not args.resume:
@@ -67,8 +67,8 @@ def main(args: SweepArgs) -> int:
     console = Console()
     programs = f"{len(groups)} compiled program{'s' * (len(groups) > 1)}"
     what = f"{len(points)} sweep points in {programs}, {config.arenas} arenas each, seed {config.seed}"
-    console.print(f"{what}: {', '.join(config.strategies)}", highlight=False)
-    with engine(args, console, len(shards(config, len(groups)))) as how, progress(console) as show:
+    console.print(f"{what}: {', '.join(item.name for item in strategies)}", highlight=False)
+    with engine(args, console, len(shards(config, len(groups), swept=True))) as how, progress(console) as show:
         manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show, **how)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
     report = write_sweep_report(out)

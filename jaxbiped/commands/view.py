@@ -5,14 +5,13 @@ from __future__ import annotations
 import time
 import webbrowser
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import pydantic
 import tyro
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.mission.strategies import STRATEGIES
 from jaxbiped.report.viewer.missions import Missions, Place, Study, missions
 from jaxbiped.report.viewer.server import refuse_taken, require, serving
 
@@ -26,7 +25,7 @@ class ViewArgs(Model):
     """To serve the page on; 0: any that is free."""
     host: str = "127.0.0.1"
     """Address to listen to; 0.0.0.0 lets other machines look, too."""
-    strategy: Literal[tuple(STRATEGIES)] | None = None
+    strategy: str | None = None
     """Of a study: whose mission to begin with; by default the first there is."""
     arena: Annotated[int, pydantic.Field(ge=0)] | None = None
     """Of a study: the arena to begin with; by default that of the median time. Of a folder with several recorded

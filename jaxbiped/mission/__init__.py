@@ -9,7 +9,7 @@ from jaxbiped.mission.queue import Jobs, Result, Tally, compile_queue, stack
 from jaxbiped.mission.settings import MissionConfig, Program, Settings, program
 from jaxbiped.mission.state import Mind, World, start
 from jaxbiped.mission.stepped import Mission, run_logged
-from jaxbiped.mission.strategies import STRATEGIES, Strategy, strategy
+from jaxbiped.mission.strategies import STRATEGIES, Strategy, find_strategy
 
 __all__ = [
     "EXECUTORS",
@@ -31,11 +31,11 @@ __all__ = [
     "World",
     "compile_queue",
     "decide",
+    "find_strategy",
     "kinematic",
     "oracle_plan",
     "program",
     "run_logged",
     "stack",
     "start",
-    "strategy",
 ]

@@ -91,7 +91,8 @@ def think(
     view, sightings = jax.lax.optimization_barrier(seen)
     if program.sensor == "oracle":
         mind = replace(mind, belief=replace(mind.belief, pose=world.pose))
-    return view, *decide(mind, view, sightings, arena, settings, program)
+    active = world.code == Code.RUNNING
+    return view, *decide(mind, view, sightings, arena, settings, program, active)
 
 
 def sense(
@@ -160,6 +161,7 @@ def conclude(
         pose_error=astray,
         yaw_error=jnp.abs(wrap_angle(belief.pose.yaw - pose.yaw)),
         before=None if world.before is None else world.pose,
+        planned=mind.planned,
     )
     mind = carried_on(walked(mind, command, executed.moved, executed.variances), executed.moved, executed.variances)
     return world, replace(mind, belief=belief, since=settings.durations.measure + acted)

@@ -21,11 +21,12 @@ from jaxbiped.mission.footing import place_feet
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.localising import localise
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.route import route
+from jaxbiped.mission.route import pose_problem
 from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Mind
+from jaxbiped.mission.state import Mind, Planned
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
+from jaxbiped.planning.planners import FINE, TOO_SLOW, Problem, Route
 from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.view import Sightings, View
 
@@ -39,9 +40,8 @@ class Thought:
 
     classes: Int[Array, "B H W"]
     levels: Int[Array, "B H W"]
-    cost: Float[Array, "B H W"]  # what is left to go, see `route`
-    ij: Int[Array, "B 2"]
-    goal_ij: Int[Array, "B 2"]
+    problem: Problem  # [B] that the planner was asked
+    route: Route  # [B] its answer
     pose: Pose  # [B] as believed
     view: View  # [B N] what was measured
     evidence: Float[Array, "B H W Z"]  # of the 3D grid, with that view
@@ -49,11 +49,20 @@ class Thought:
 
 @with_own_settings
 def decide(
-    mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program
+    mind: Mind,
+    view: View,
+    sightings: Sightings,
+    arena: Arena,
+    settings: Settings,
+    program: Program,
+    active: Bool[Array, "B"] | None = None,
 ) -> tuple[Mind, Command, Int[Array, "B"], Thought]:
     """What each robot does next. All arguments have a leading batch axis.
 
     Of the arena only what the robot was told is read: landmarks and goal (paper, 2, conditions 2 and 3).
+
+    Args:
+      active: robots whose decision is used; by default all.
 
     Returns:
       The mind after the measurement, the command, the code with which the mission ends of the robot's own
@@ -70,12 +79,28 @@ def decide(
     )
     heading = jax.vmap(nearest_direction)(mind.belief.pose.yaw)
     yaw = mind.belief.pose.yaw
-    to_go, directions = route(plan_classes, plan_levels, goal_ij, ij, heading, yaw, settings, program)
-    mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, 0, 0, None))(
-        mind, view, ij, goal_ij, directions, classes, levels, blind, settings, program
+    problem = pose_problem(
+        plan_classes, plan_levels, goal_ij, ij, heading, yaw, settings, program, active, mind.plan_state
     )
+    route = settings.planner.plan_batch(problem)
+    mind = replace(mind, plan_state=route.state, planned=counted(mind.planned, route))
+    mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, 0, 0, None))(
+        mind, view, ij, goal_ij, route.directions, classes, levels, blind, settings, program
+    )
+    if route.fault is not None:
+        code = jnp.where(route.fault == TOO_SLOW, Code.PLANNER_TIMEOUT, Code.PLANNER_FAILED)
+        verdict = jnp.where(route.fault == FINE, verdict, code).astype(jnp.int32)
     evidence = mind.grid_map.evidence
-    return mind, command, verdict, Thought(classes, levels, to_go, ij, goal_ij, mind.belief.pose, view, evidence)
+    return mind, command, verdict, Thought(classes, levels, problem, route, mind.belief.pose, view, evidence)
+
+
+def counted(planned: Planned, route: Route) -> Planned:
+    """What is told of a mission's planning, with one more route."""
+    unknown = jnp.full_like(planned.seconds, jnp.nan)
+    seconds = unknown if route.seconds is None else route.seconds
+    cost = unknown if route.cost is None else route.cost
+    first = jnp.isnan(planned.cost) & jnp.isfinite(cost)
+    return Planned(planned.seconds + seconds, planned.calls + 1, jnp.where(first, cost, planned.cost))
 
 
 def perceive(

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.decision import nearest_direction
-from jaxbiped.mission.route import route
+from jaxbiped.mission.route import pose_problem
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.motion.primitives import duration
 from jaxbiped.motion.selection import cell_of, select
@@ -43,7 +43,8 @@ def follow(
         x, y, yaw, time, _, count = state
         ij = jax.vmap(cell_of, in_axes=(0, 0, None))(x, y, spec)
         heading = jax.vmap(nearest_direction)(yaw)
-        _, directions = route(classes, levels, goal_ij, ij, heading, yaw, settings, program)
+        problem = pose_problem(classes, levels, goal_ij, ij, heading, yaw, settings, program)
+        directions = settings.planner.plan_batch(problem).directions
         command = jax.vmap(select, in_axes=(0, 0, 0, 0, 0, None, None))(
             Pose(x, y, jnp.zeros_like(x), yaw), ij, jnp.maximum(directions, 0), classes, levels, jnp.bool_(False), spec
         )

@@ -12,11 +12,10 @@ from jaxtyping import Array, Bool, Float
 from jaxbiped import planning
 from jaxbiped.arenas.arena import CIRCLE, Arena
 from jaxbiped.geometry.pose import to_world
-from jaxbiped.mapping import Cell, level_view
+from jaxbiped.mapping import level_view
 from jaxbiped.mapping.cobstacles import occupied_levels
-from jaxbiped.mission.decision import Thought, nearest_direction
+from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.log import Mark, Outline, Walk
-from jaxbiped.mission.route import quickest
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import World
 
@@ -96,29 +95,20 @@ def mind_pose(mind) -> Float[np.ndarray, "3"]:
 def planned_way(thought: Thought, settings: Settings, program: Program) -> Float[np.ndarray, "n 2"]:
     """Cell centres [m] of the planned path, from the robot's cell on; empty where there is none."""
     spec = program.spec
-    moves = np.asarray(way(thought, settings, program)[0])
+    moves = np.asarray(way(thought, settings)[0])
     moves = moves[: np.argmax(moves < 0)] if np.any(moves < 0) else moves
     if len(moves) == 0:
         return np.zeros((0, 2))
-    cells = np.asarray(thought.ij[0]) + np.vstack(
+    cells = np.asarray(thought.problem.start_ij[0]) + np.vstack(
         [np.zeros((1, 2), int), np.cumsum(planning.DIRECTIONS[moves], axis=0)]
     )
     return (cells[:, ::-1] + 0.5) * spec.pitch
 
 
-@partial(jax.jit, static_argnames=("program",))
-def way(thought: Thought, settings: Settings, program: Program):
-    """Moves of the planned path, as `decide` reads its first."""
-    blind = settings.strategy.blind
-    classes = jnp.where(blind, jnp.int8(Cell.FLOOR), thought.classes)
-    levels = jnp.where(blind, jnp.int8(0), thought.levels)
-    length = 3 * sum(program.spec.shape)
-    if program.planner == "heading":
-        field = quickest(classes, levels, thought.goal_ij, settings, program)
-        return planning.heading_path(field, thought.ij, thought.pose.yaw, length).directions
-    costs, rules = settings.costs.at_pitch(program.spec.pitch), settings.strategy.rules()
-    heading = nearest_direction(thought.pose.yaw[0])[None]
-    return planning.next_step(thought.cost, classes, levels, costs, rules, thought.ij, heading, length=length)
+@jax.jit
+def way(thought: Thought, settings: Settings):
+    """Moves of the planned path, of which `decide` reads the first."""
+    return settings.planner.whole_way(thought.problem, thought.route)
 
 
 def outlines(arena: Arena) -> tuple[Outline, ...]:

@@ -17,6 +17,8 @@ class Code(enum.IntEnum):
     OUT_OF_BOUNDS = 5
     OUT_OF_STEPS = 6
     INVALID = 7  # NaN or overflow
+    PLANNER_FAILED = 8  # the planner raised an error, or gave a way that its map forbids
+    PLANNER_TIMEOUT = 9  # it took longer than it may
 
     @property
     def label(self) -> str:

@@ -24,7 +24,7 @@ from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Mind, World, start
+from jaxbiped.mission.state import Mind, Planned, World, start
 
 SLOTS = 64  # missions at once: maps of this many arenas fit the cache of one core
 TURNS = 32  # decisions between two looks of the host at the queue
@@ -54,19 +54,21 @@ class Result:
     goal_distance: Float[Array, "N"]  # [m] from the goal, at the end
     pose_error: Float[Array, "N"]  # [m] from where the robot believed to stand, at the end
     yaw_error: Float[Array, "N"]  # [rad] the same of its yaw
+    planned: Planned
 
 
 def ending(world: World, goal_xy: Float[Array | np.ndarray, "*N 2"]) -> Result:
     """How missions ended whose worlds these are, in arenas with these goals."""
     away = jnp.hypot(goal_xy[..., 0] - world.pose.x, goal_xy[..., 1] - world.pose.y)
     done = world.code, world.distance, world.time, world.measurements, world.decisions
-    return Result(*done, away, world.pose_error, world.yaw_error)
+    return Result(*done, away, world.pose_error, world.yaw_error, world.planned)
 
 
 def no_results(*shape: int) -> Result:
     """Zeros, on the host."""
     kinds = int, float, float, int, int, float, float, float
-    return Result(*(np.zeros(shape, kind) for kind in kinds))
+    planned = Planned(*(np.zeros(shape, kind) for kind in (float, int, float)))
+    return Result(*(np.zeros(shape, kind) for kind in kinds), planned)
 
 
 @jax.tree_util.register_dataclass
@@ -182,7 +184,8 @@ def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots:
     job = jnp.arange(slots, dtype=jnp.int32)
     world, mind = begin(arenas, settings, jobs, job, program)
     zero, none = jnp.zeros(jobs.arena.shape), jnp.zeros(jobs.arena.shape, jnp.int32)
-    result = Result(none + Code.RUNNING, zero, zero, none, none, zero, zero, zero)
+    planned = Planned(zero, none, zero)
+    result = Result(none + Code.RUNNING, zero, zero, none, none, zero, zero, zero, planned)
     return Queue(world, mind, job, jnp.int32(slots), result)
 
 
@@ -224,11 +227,12 @@ def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program
 
 
 def begin(arenas: Arena, settings: Settings, jobs: Jobs, job: Int[Array, "S"], program: Program) -> tuple[World, Mind]:
-    """Fresh missions for the jobs of all slots."""
+    """Fresh missions for the jobs of all slots; a slot without a job has one that has ended."""
     at = jnp.minimum(job, jobs.arena.shape[0] - 1)
     arena, setting = pick(arenas, jobs.arena[at]), pick(settings, jobs.point[at])
     begun = jax.vmap(start, in_axes=(0, 0, 0, None, None))
-    return begun(arena, setting, jobs.seed[at], program.spec, program.localisation)
+    world, mind = begun(arena, setting, jobs.seed[at], program.spec, program.localisation)
+    return replace(world, code=jnp.where(job < jobs.count, world.code, Code.REACHED)), mind
 
 
 def pick(tree, index: Int[Array, "S"]):

@@ -1,17 +1,19 @@
-"""From the classed map to the first moves of a plan: by the costs of Eq. 1 over cells, or by time over headings."""
+"""From the classed map to the problem that a planner is asked, and to the first moves of its answer."""
 
 from __future__ import annotations
 
-from jaxtyping import Array, Float, Int, Int8
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import planning
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.motion.approach import foresight
 from jaxbiped.motion.selection import stride
+from jaxbiped.planning.planners import Problem
 from jaxbiped.planning.rims import rim_costs
 
 
-def route(
+def pose_problem(
     classes: Int[Array, "B H W"],
     levels: Int[Array, "B H W"],
     goal_ij: Int[Array, "B 2"],
@@ -20,43 +22,36 @@ def route(
     yaw: Float[Array, "B"],
     settings: Settings,
     program: Program,
-) -> tuple[Float[Array, "B H W"], Int8[Array, "B n"]]:
-    """What is left from each cell to the goal, and the first moves from the robot's own; -1 where there is none.
+    active: Bool[Array, "B"] | None = None,
+    state=None,
+) -> Problem:
+    """What the planner of each robot is asked.
 
-    What is left is a cost of Eq. 1, or the time [s] from the best heading with the planner `heading`. Robots whose feet
-    are placed keep off edges beside their way (`planning.rims`).
+    Robots whose feet are placed keep off edges beside their way: `planning.rims` says what that costs.
 
     Args:
       heading: the direction nearest to `yaw` [rad].
+      active: robots whose answer is used; by default all.
+      state: of the planners.
     """
-    costs, rules, pitch = settings.costs.at_pitch(program.spec.pitch), settings.strategy.rules(), program.spec.pitch
-    length = max(stride(program.spec), foresight(program.spec)) if program.footing else stride(program.spec)
-    if program.planner == "heading":
-        field = quickest(classes, levels, goal_ij, settings, program)
-        return field.cost.min(1), planning.heading_path(field, ij, yaw, length).directions
-    if program.footing:
-        moves = planning.edge_costs(classes, levels, costs, rules)
-        moves = moves + rim_costs(classes, levels, pitch)
-        to_go = planning.cost_to_go(moves, goal_ij)
-        return to_go.cost, planning.read_path(to_go, moves, ij, length, heading).directions
-    to_go = planning.field(classes, levels, costs, rules, goal_ij)
-    return to_go.cost, planning.next_step(to_go.cost, classes, levels, costs, rules, ij, heading, length=length)
-
-
-def quickest(
-    classes: Int[Array, "B H W"],
-    levels: Int[Array, "B H W"],
-    goal_ij: Int[Array, "B 2"],
-    settings: Settings,
-    program: Program,
-) -> planning.HeadingField:
-    """The field of the planner `heading`: times of the mission's own clock."""
-    extra = None
-    if program.footing:
-        unit = seconds_of_a_unit(settings).reshape(-1, 1, 1, 1)  # of each robot, or of all
-        extra = unit * rim_costs(classes, levels, program.spec.pitch)
-    return planning.heading_field(
-        classes, levels, times_of(settings), settings.strategy.rules(), goal_ij, program.spec.pitch, extra
+    spec = program.spec
+    length = max(stride(spec), foresight(spec)) if program.footing else stride(spec)
+    return Problem(
+        classes=classes,
+        levels=levels,
+        start_ij=ij,
+        goal_ij=goal_ij,
+        heading=heading,
+        yaw=yaw,
+        costs=settings.costs.at_pitch(spec.pitch),
+        rules=settings.strategy.rules(),
+        times=times_of(settings),
+        unit_seconds=seconds_of_a_unit(settings),
+        surcharge=rim_costs(classes, levels, spec.pitch) if program.footing else None,
+        active=jnp.ones(ij.shape[0], bool) if active is None else active,
+        state=state,
+        pitch=spec.pitch,
+        length=length,
     )
 
 

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pydantic
 from jaxtyping import Array, Float, Int
 
@@ -17,10 +18,11 @@ from jaxbiped.errors import InputError
 from jaxbiped.mapping import Body, GridSpec, MapConfig, MapParams
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.library import Library, load_library
-from jaxbiped.mission.strategies import Strategy, strategy
+from jaxbiped.mission.strategies import Strategy, StrategyFlags, find_strategy
 from jaxbiped.motion.primitives import DurationConfig, Durations
 from jaxbiped.motion.robot import HEIGHT_TOLERANCE, Footing, RobotConfig
 from jaxbiped.planning import Costs
+from jaxbiped.planning.planners import GridPlanner, HeadingPlanner, Planner
 from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
 from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
 from jaxbiped.sensing.motion import VisualConfig, VisualNoise
@@ -159,12 +161,14 @@ class MissionConfig(Model):
         """The static grid of an area [m]; InputError when the pitch does not divide it."""
         return GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch, max_radius=MAX_RADIUS)
 
-    def settings(self, strategy_name: str) -> Settings:
-        """The traced part, for one strategy."""
+    def settings(self, strategy: str | Strategy) -> Settings:
+        """The traced part, for one strategy or the one of a name."""
         limits = self.limits
         sd, sd_yaw = limits.start_sd
+        strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
         return Settings(
-            strategy=strategy(strategy_name, self.corner_cutting),
+            strategy=strategy.flags(self.corner_cutting),
+            planner=PLANNERS[self.planner] if strategy.planner is None else traced_planner(strategy.planner),
             costs=numbers(self.costs),
             durations=numbers(self.durations),
             body=numbers(self.robot, "body"),
@@ -187,6 +191,14 @@ class MissionConfig(Model):
                 start_variance=jnp.array([sd**2, sd**2, sd_yaw**2], jnp.float32),
             ),
         )
+
+
+PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # of strategies that bring none of their own
+
+
+def traced_planner(planner: Planner) -> Planner:
+    """A planner with its numbers as arrays of the types that programs compute with."""
+    return jax.tree.map(lambda leaf: np.asarray(leaf, jax.dtypes.canonicalize_dtype(np.asarray(leaf).dtype)), planner)
 
 
 @functools.lru_cache(maxsize=256)
@@ -221,7 +233,8 @@ class Limits:
 class Settings:
     """Every number that a sweep may change. All leaves are traced, scalars or with a leading batch axis."""
 
-    strategy: Strategy
+    strategy: StrategyFlags
+    planner: Planner
     costs: Costs
     durations: Durations
     body: Body
@@ -245,7 +258,6 @@ class Program:
     sensor: str
     executor: str
     footing: bool = False  # feet are placed by measured edges; else by cells alone
-    planner: str = "cell"  # "heading": over cells and headings, by time
     localisation: str = "landmarks"
     fading: bool = False  # the map forgets what has moved
 
@@ -259,7 +271,6 @@ def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
         config.sensor,
         config.executor,
         footing,
-        config.planner,
         localisation="landmarks" if config.sensor == "oracle" else config.localisation,
         fading=config.mapping.fade is not None,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +23,16 @@ from jaxbiped.sensing.localisation import Belief
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
+class Planned:
+    """What is told of a mission's planning."""
+
+    seconds: Float[Array, "*B"]  # [s] that it took; NaN where that is not known
+    calls: Int[Array, "*B"]
+    cost: Float[Array, "*B"]  # by Eq. 1, of the first way that was found; NaN where that is not known
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
 class World:
     """The referee's side: only sensors and executors read it, the robot never does."""
 
@@ -35,6 +46,7 @@ class World:
     seed: UInt32[Array, "*B"]  # of all noise of this mission
     pose_error: Float[Array, "*B"]  # [m] from where the robot believes to stand
     yaw_error: Float[Array, "*B"]  # [rad] the same of its yaw, without sign
+    planned: Planned
     before: Pose | None = None  # where it stood one command earlier; only where its motion is measured
 
 
@@ -78,6 +90,8 @@ class Mind:
     ahead: Edge  # of the ground, that the robot is about to cross; only where footing counts
     behind: Edge  # that it crossed last
     since: Float[Array, "*B"]  # [s] from the last measurement to the next
+    planned: Planned
+    plan_state: Any = None  # of its planner
     anchor: Anchor | None = None  # only where its motion is measured
     outlines: Outlines | None = None  # of walls; only where it localises by these
 
@@ -95,8 +109,23 @@ def start(
     code = jnp.where(jnp.isfinite(away) & jnp.isfinite(yaw), code, Code.INVALID)
     visual = localisation in VISUAL
     none = jnp.zeros(())
-    world = World(pose, no, none, none, zero, zero, code, seed, none, none, before=pose if visual else None)
+    planned = Planned(none, zero, jnp.full_like(none, jnp.nan))
+    world = World(pose, no, none, none, zero, zero, code, seed, none, none, planned, pose if visual else None)
     belief = Belief(pose, jnp.diag(settings.limits.start_variance))
     outlines = no_outlines(spec) if localisation in ICP else None
     anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None
-    return world, Mind(belief, empty(spec), no, no, zero, ~no, unknown(), unknown(), none, anchor, outlines)
+    return world, Mind(
+        belief=belief,
+        grid_map=empty(spec),
+        squat=no,
+        look=no,
+        tries=zero,
+        fresh=~no,
+        ahead=unknown(),
+        behind=unknown(),
+        since=none,
+        planned=planned,
+        plan_state=settings.planner.initial_state(spec.shape),
+        anchor=anchor,
+        outlines=outlines,
+    )

@@ -1,20 +1,26 @@
-"""The strategies that are compared (paper, Table 1): what a robot dares to step on."""
+"""Strategies: what a robot plans its way by, and what it dares to step on (paper, Table 1)."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
+from jaxbiped.core.registry import Registry
+from jaxbiped.errors import InputError
 from jaxbiped.planning import Rules
+from jaxbiped.planning.planners import Planner
+
+NAME = re.compile(r"[A-Za-z][\w .+-]{0,39}")  # shown in tables, figures and pages
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Strategy:
-    """One row of Table 1, traced: missions of different strategies share one compiled program."""
+class StrategyFlags:
+    """What a strategy dares, traced: missions of different strategies share one compiled program."""
 
     bumps: Bool[Array, "*B"]  # steps over bumps; else they are obstacles
     gates: Bool[Array, "*B"]  # passes gates; else they are obstacles
@@ -26,17 +32,85 @@ class Strategy:
         return Rules(corner_cutting=self.corner_cutting, bumps=self.bumps, gates=self.gates)
 
 
-# name: (bumps, gates, blind); the bracketed works are those of the paper's Table 1
-STRATEGIES: dict[str, tuple[bool, bool, bool]] = {
-    "full": (True, True, False),  # this study
-    "bump_aware": (True, False, False),  # [7-10]
-    "gate_aware": (False, True, False),  # [11, 12]
-    "floor_only": (False, False, False),  # [6], and the reference of experiment 4
-    "blind_stop": (False, False, True),  # [4, 5]
-}
+@dataclass(frozen=True)
+class Strategy:
+    """A name, a planner, and what the robot dares.
+
+    Raises:
+      InputError: a name that cannot be shown everywhere; a planner that is none, or no pytree.
+    """
+
+    name: str
+    planner: Planner | None = None  # None: the planner of the mission's config, by the costs of Eq. 1 by default
+    bumps: bool = True
+    gates: bool = True
+    blind: bool = False
+
+    def __post_init__(self):
+        if not isinstance(self.name, str) or not NAME.fullmatch(self.name):
+            message = "must begin with a letter and have at most 40 letters, digits, blanks and . _ + -"
+            raise InputError(message, field="name of a strategy", value=self.name)
+        if self.planner is not None:
+            check_planner(self.planner, self.name)
+
+    def flags(self, corner_cutting: bool = False) -> StrategyFlags:
+        """The traced part."""
+        return StrategyFlags(*(jnp.asarray(v) for v in (self.bumps, self.gates, self.blind, corner_cutting)))
 
 
-def strategy(name: str, corner_cutting: bool = False) -> Strategy:
-    """The strategy called `name`; KeyError where there is none."""
-    bumps, gates, blind = STRATEGIES[name]
-    return Strategy(*(jnp.asarray(flag) for flag in (bumps, gates, blind, corner_cutting)))
+def check_planner(planner: object, name: str) -> None:
+    """Raise `InputError` unless an object can plan inside a compiled program."""
+    where, kind = f"planner of {name}", type(planner).__name__
+    if not isinstance(planner, Planner):
+        raise InputError(f"must be a Planner, not {kind}; wrap a function of NumPy arrays in HostPlanner", field=where)
+    leaves, structure = jax.tree.flatten(planner)
+    if len(leaves) == 1 and leaves[0] is planner:
+        raise InputError(f"{kind} is no pytree; decorate it with jax.tree_util.register_dataclass", field=where)
+    for leaf in leaves:
+        try:
+            jnp.asarray(leaf)
+        except TypeError:
+            message = f"{kind} holds a {type(leaf).__name__}; what is no number must be a static field"
+            raise InputError(message, field=where) from None
+    try:
+        hash(structure)
+    except TypeError:
+        raise InputError(f"{kind} has a static field that cannot be hashed", field=where) from None
+
+
+# The bracketed works are those of the paper's Table 1.
+STRATEGIES = Registry("strategy", "jaxbiped.planners")
+for _strategy in (
+    Strategy("full"),  # this study
+    Strategy("bump_aware", gates=False),  # [7-10]
+    Strategy("gate_aware", bumps=False),  # [11, 12]
+    Strategy("floor_only", bumps=False, gates=False),  # [6], and the reference of experiment 4
+    Strategy("blind_stop", bumps=False, gates=False, blind=True),  # [4, 5]
+):
+    STRATEGIES.add(_strategy.name, _strategy)
+
+
+def as_strategy(thing: object, name: str) -> Strategy:
+    """A strategy of something that stands for one: a strategy, a planner or its class, a function of NumPy arrays.
+
+    Args:
+      name: of a strategy that has none yet.
+    """
+    if isinstance(thing, Strategy):
+        return thing
+    if isinstance(thing, type) and issubclass(thing, Planner):
+        thing = thing()
+    if not isinstance(thing, Planner) and callable(thing):
+        from jaxbiped.planning.host_planner import HostPlanner
+
+        thing = HostPlanner(thing)
+    return Strategy(name, thing)
+
+
+def find_strategy(name: str) -> Strategy:
+    """The strategy of a name in the registry, or of `package.module:name`, which is imported.
+
+    Raises:
+      InputError: a name that is not known, with those that are; a module that cannot be imported.
+    """
+    return STRATEGIES.find(name, as_strategy)

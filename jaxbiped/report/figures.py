@@ -34,7 +34,10 @@ CODE_COLOURS = {
     "out_of_bounds": "#CC79A7",
     "out_of_steps": "#F0C53A",
     "invalid": "#000000",
+    "planner_failed": "#5D3A9B",
+    "planner_timeout": "#A98BD0",
 }
+OWN_COLOURS = ("#D55E00", "#56B4E9", "#8E1F1C", "#5D3A9B", "#B0A000", "#000000")  # of strategies that people bring
 FAMILY_COLOURS = ("#0072B2", "#D55E00", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#7F7F7F")
 INK, GRID = "#333333", "#DDDDDD"
 BINS = 5  # of difficulty
@@ -224,6 +227,9 @@ def look(name: str, names: Sequence[str]) -> tuple[str, str]:
     """Colour and mark of one of `names`: a strategy's own, else by its place among them."""
     if name in COLOURS:
         return COLOURS[name], MARKERS[name]
+    if set(names) & set(COLOURS):  # beside those that are built in
+        place = [other for other in names if other not in COLOURS].index(name) % len(OWN_COLOURS)
+        return OWN_COLOURS[place], "P*Xdph"[place]
     place = names.index(name) % len(FAMILY_COLOURS)
     return FAMILY_COLOURS[place], "osD^vP*"[place]
 

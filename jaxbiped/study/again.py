@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import polars as pl
 
-from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.config import parse
 from jaxbiped.errors import InputError
-from jaxbiped.mission.eyes import eyes_for
 from jaxbiped.mission.queue import stack
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
-from jaxbiped.mission.stepped import Mission, run_logged
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.stepped import Mission
+from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.comparison import paired
+from jaxbiped.study.components import hash_of
 from jaxbiped.study.evaluate import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
+from jaxbiped.study.runner import check_mission, play_one, seeing
+from jaxbiped.study.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.sweep import point_at
 
 
@@ -80,29 +81,44 @@ class Origin(NamedTuple):
 
 
 def play_again(
-    manifest: Manifest, point: int, values: dict[str, float], strategy: str, arenas: Sequence[int]
+    manifest: Manifest,
+    point: int,
+    values: dict[str, float],
+    strategy: str,
+    arenas: Sequence[int],
+    own: Mapping[str, Strategy] | None = None,
 ) -> list[Mission]:
     """Missions of some arenas, as the study played them, with their logs. Other arguments: see `Origin`.
 
+    Args:
+      own: strategies by their names that are not built in. A results folder never causes an import.
+
     Raises:
-      InputError: a config that this version does not know, or a biped that cannot be simulated here.
+      InputError: a config that this version does not know, a biped that cannot be simulated here, or a strategy that
+        is not built in and not given, or is not the one of the study.
     """
+    again = strategy_again(manifest, strategy, own or {})
     config, families, population = mission_of(manifest, point, values)
     populations = None if population == PopulationConfig() else stack([population.traced()])
     batch, seeds = draw(jax.random.key(manifest.seed), jnp.asarray(arenas), families, populations)
-    play, static = run_logged, program(config, (SIZE_X, SIZE_Y))
-    if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse, walk_logged  # loads MuJoCo
-
-        rehearse(config)
-        play = partial(walk_logged, config=config.walk)
-    settings, eyes = config.settings(strategy), eyes_for(config)
+    check_mission(config)
     each = [jax.tree.map(lambda leaf, k=k: leaf[k], batch) for k in range(len(arenas))]
-    try:
-        return [play(arena, settings, seed, static, eyes=eyes) for arena, seed in zip(each, seeds, strict=True)]
-    finally:
-        if eyes:
-            eyes.close()
+    with seeing(config) as eyes:
+        return [play_one(arena, config, again, seed, eyes=eyes) for arena, seed in zip(each, seeds, strict=True)]
+
+
+def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -> Strategy:
+    """A strategy of a study: one that is built in, or that is given again and has the hash that the study tells."""
+    if name in BUILT_IN:
+        return find_strategy(name)
+    if name not in own:
+        message = "is not built in: its missions can be played again only by a program that gives it again"
+        raise InputError(message, field="strategy", value=name)
+    known = manifest.config.get("components", {})
+    hashes = [value for place, value in known.items() if name in (place, place.rpartition(":")[2])]
+    if hash_of(own[name]) not in hashes:
+        raise InputError("has other code or other numbers than in the study", field="strategy", value=name)
+    return own[name]
 
 
 def mission_of(

@@ -12,7 +12,7 @@ import polars as pl
 from jaxbiped.errors import InputError
 from jaxbiped.study.intervals import NOTHING, Estimate, proportion
 from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
-from jaxbiped.study.schema import CODES, KNOWN, SCENE, STRATEGIES, validate
+from jaxbiped.study.schema import CODES, KNOWN, SCENE, ordered, validate
 
 QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about
 
@@ -116,7 +116,7 @@ def compare(
     if frame.is_empty():
         raise InputError("no row of this sweep point", field="point", value=point)
     present = set(frame["strategy"])
-    strategies = tuple(name for name in STRATEGIES if name in present)
+    strategies = ordered(present)
     pairs = default_pairs(strategies) if pairs is None else tuple(pairs)
     for name in {name for pair in pairs for name in pair} - present:
         raise InputError(f"must be one of {', '.join(strategies)}", field="pairs", value=name)

@@ -9,9 +9,10 @@ import polars as pl
 
 from jaxbiped.study import store
 from jaxbiped.study.clock import CompileClock
+from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress, evaluate
-from jaxbiped.study.groups import Point, Shard, group_points, only_point, shards
+from jaxbiped.study.groups import Point, Shard, group_points, only_point, shards, strategies_of
 from jaxbiped.study.resume import resume as take_up
 
 # Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.
@@ -47,18 +48,18 @@ def conduct(
     Raises:
       InputError: a folder that is not so, or a full disk; what was stored stays readable.
     """
-    clock = CompileClock()
+    clock, config = CompileClock(), fingerprinted(config)
     compile_time = compile_time or (lambda: clock.seconds)
     swept = points is not None
     points = tuple(points) if swept else only_point(config)
     kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
     kind["device_name"] = device
     if resume:
-        results = take_up(folder, config, rows=shard_rows(config, points), **kind)
+        results = take_up(folder, config, rows=shard_rows(config, points, swept=swept), **kind)
     else:
         results = store.create(folder, config, **kind)
     with results:
-        judge = in_order(enough)
+        judge = in_order(enough, parts=1 if swept else len(group_points(points, strategies_of(config))))
         paths = store.shard_paths(results.folder) if enough is not never else []
         if not any(judge(store.shard_number(path), pl.read_parquet(path)) for path in paths):
             for shard, frame in engine(config, on_progress, points=points, done=results.done()):
@@ -68,10 +69,13 @@ def conduct(
         return results.finish(compile_time=compile_time())
 
 
-def in_order(enough: Callable[[pl.DataFrame], bool]) -> Callable[[int, pl.DataFrame], bool]:
+def in_order(enough: Callable[[pl.DataFrame], bool], parts: int = 1) -> Callable[[int, pl.DataFrame], bool]:
     """`enough` for shards that come in any order, with their numbers: the others wait for the one whose turn it is.
 
     Which shard ends first depends on what is in it, so that a rule which looked at them as they come would be biased.
+
+    Args:
+      parts: shards that a block of arenas consists of, which are looked at together.
     """
     waiting: dict[int, pl.DataFrame] = {}
     turn = 0
@@ -81,19 +85,20 @@ def in_order(enough: Callable[[pl.DataFrame], bool]) -> Callable[[int, pl.DataFr
         if enough is never:
             return False
         waiting[number] = frame
-        while turn in waiting:
-            turn += 1
-            if enough(waiting.pop(turn - 1)):
+        while all(turn + part in waiting for part in range(parts)):
+            block = pl.concat([waiting.pop(turn + part) for part in range(parts)])
+            turn += parts
+            if enough(block):
                 return True
         return False
 
     return judge
 
 
-def shard_rows(config: StudyConfig, points: Sequence[Point]) -> list[int]:
+def shard_rows(config: StudyConfig, points: Sequence[Point], *, swept: bool = False) -> list[int]:
     """Rows of each shard, by its number."""
-    sizes = [len(group.points) * len(config.strategies) for group in group_points(points, config.strategies)]
-    return [shard.count * sizes[shard.group] for shard in shards(config, len(sizes))]
+    sizes = [len(group.points) * len(group.strategies) for group in group_points(points, strategies_of(config))]
+    return [shard.count * sizes[shard.group] for shard in shards(config, len(sizes), swept=swept)]
 
 
 def table(points: Sequence[Point]) -> pl.DataFrame:

@@ -9,11 +9,22 @@ import tyro
 
 from jaxbiped.arenas.population import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
+from jaxbiped.core.registry import PLACE
 from jaxbiped.mission.settings import SIMULATED, MissionConfig
+from jaxbiped.mission.strategies import STRATEGIES as KNOWN_STRATEGIES
 from jaxbiped.study.schema import FAMILIES, KNOWN, MOVING, STRATEGIES
 
 Family = Literal[KNOWN]
-StrategyName = Literal[STRATEGIES]
+
+
+def known_strategy(name: str) -> str:
+    """A name that is registered, or `package.module:name`, of which nothing is imported here."""
+    if not (KNOWN_STRATEGIES.knows(name) or PLACE.fullmatch(name)):
+        raise ValueError(f"must be one of {', '.join(KNOWN_STRATEGIES)}, or package.module:name of your own planner")
+    return name
+
+
+StrategyName = Annotated[str, pydantic.AfterValidator(known_strategy)]
 
 
 class StudyConfig(Model):
@@ -25,6 +36,8 @@ class StudyConfig(Model):
     families: Annotated[tuple[Family, ...], pydantic.Field(min_length=1)] = FAMILIES
     """They take turns: arena k is of family k modulo their number."""
     strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
+    components: Annotated[dict[str, str], tyro.conf.Fixed] = pydantic.Field(default_factory=dict)
+    """A hash of the code and the numbers of each strategy that is not built in; filled in when the study begins."""
     shard: Annotated[int, pydantic.Field(ge=1, le=65536)] = 1024
     """Arenas that are computed, and written, together."""
     population: PopulationConfig = PopulationConfig()

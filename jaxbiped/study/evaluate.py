@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -35,8 +34,8 @@ from jaxbiped.mission.queue import (
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards
-from jaxbiped.study.hosted import open_eyes, run_on_host
+from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards, strategies_of
+from jaxbiped.study.runner import batch_driver
 from jaxbiped.study.schema import KNOWN, SCENE, SCHEMA
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
@@ -68,8 +67,8 @@ def evaluate(
       points: sweep points; by default the one of `config`.
       done: numbers of shards to leave out. What others hold does not depend on them.
     """
-    groups = group_points(points or only_point(config), config.strategies)
-    left = [shard for shard in shards(config, len(groups)) if shard.number not in done]
+    groups = group_points(points or only_point(config), strategies_of(config))
+    left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
     rows = [shard.count * len(groups[shard.group].population_of) for shard in left]
     before, total = Tally(0, 0), sum(rows)
     for shard in left:
@@ -97,21 +96,13 @@ def compute(
     size = min(config.shard, config.arenas)
     index = shard.first + jnp.arange(size)
     batch, seeds = draw(jax.random.key(config.seed), index, config.families, group.populations)
-    play = partial(run_all, workers=workers)
-    with contextlib.ExitStack() as stack:
-        see = partial(open_eyes, group.camera, group.static.localisation) if group.camera else None
-        if group.walk is not None:
-            from jaxbiped.study.walks import walk_all  # loads MuJoCo
-
-            play = partial(walk_all, config=group.walk, eyes=stack.enter_context(see()) if see else None)
-        elif see:
-            play = partial(run_on_host, open_eyes=see, workers=workers)
+    with batch_driver(group, workers) as play:
         result = play(
             batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
         )
     batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
     plan = plan_all(batch, group, size)
-    return frame(np.arange(shard.first, shard.first + shard.count), batch, group, config.strategies, result, plan)
+    return frame(np.arange(shard.first, shard.first + shard.count), batch, group, result, plan)
 
 
 @with_own_settings
@@ -240,12 +231,11 @@ def frame(
     index: Int[np.ndarray, "A"],
     batch: Arena,
     group: Group,
-    strategies: Sequence[str],
     result: Result,
     plan: OraclePlan,
 ) -> pl.DataFrame:
     """Rows of all points and strategies on arenas `index`, the first of the batch, which is on the host."""
-    count, kinds = len(index), len(group.population_of)
+    count, kinds, strategies = len(index), len(group.population_of), group.strategies
     family, difficulty = batch.family[:count], batch.difficulty[:count]
     reached = result.code == Code.REACHED
     reachable, cost, length = (values[:, :count] for values in (plan.reachable, plan.cost, plan.length))
@@ -269,6 +259,9 @@ def frame(
         "reachable": reachable,
         "oracle_cost": masked(cost, reachable),
         "oracle_length": masked(length, reachable & np.isfinite(length)),
+        "planning_calls": result.planned.calls,
+        "planning_time": masked(result.planned.seconds, np.isfinite(result.planned.seconds)),
+        "plan_cost": masked(result.planned.cost, np.isfinite(result.planned.cost)),
     }
     flat = {name: column.ravel() if isinstance(column, np.ndarray) else column for name, column in columns.items()}
     return pl.DataFrame(flat, schema_overrides={"point": pl.Int32}).cast(dict(SCHEMA))

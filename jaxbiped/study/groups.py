@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 
+import jax
 import numpy as np
 from jaxtyping import Int
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.population import Population, PopulationConfig
+from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.queue import stack
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program
-from jaxbiped.mission.strategies import strategy
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program, traced_planner
+from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.planning.planners import Planner
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.study.config import StudyConfig
 
@@ -27,16 +30,18 @@ class Point:
     mission: MissionConfig
     population: PopulationConfig
     values: dict[str, float] = field(default_factory=dict)  # dotted field of the config: its value here
+    planner: dict[str, float] = field(default_factory=dict)  # of these, the numbers of planners
 
 
 @dataclass(frozen=True)
 class Group:
-    """Sweep points that differ in traced numbers alone: `P` points, `S` strategies, one compiled program."""
+    """Points and strategies that differ in traced numbers alone: `P` points, `S` strategies, one compiled program."""
 
     static: Program
     walk: WalkConfig | None  # of simulated bipeds
     camera: CameraConfig | None  # of sensors that measure on the host
     points: tuple[int, ...]  # indices of the points, rising
+    strategies: tuple[str, ...]  # their names
     settings: Settings  # [P * S], strategy by strategy within a point
     populations: Population | None  # [U], those that differ; None: nothing is fixed in any
     population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
@@ -57,19 +62,64 @@ def only_point(config: StudyConfig) -> tuple[Point, ...]:
     return (Point(0, config.mission, config.population),)
 
 
-def group_points(points: Iterable[Point], strategies: Sequence[str]) -> tuple[Group, ...]:
+def strategies_of(config: StudyConfig) -> tuple[Strategy, ...]:
+    """The strategies of a study, in its order.
+
+    Raises:
+      InputError: a name that is not known, a module that cannot be imported, two strategies of one name.
+    """
+    found = tuple(find_strategy(name) for name in config.strategies)
+    for k, item in enumerate(found):
+        if item.name in [other.name for other in found[:k]]:
+            raise InputError("two of them have this name", field="strategies", value=item.name)
+    return found
+
+
+def group_points(points: Iterable[Point], strategies: Sequence[Strategy | str]) -> tuple[Group, ...]:
     """Points by what sets array shapes and code paths (`mission.program`), in the order of their first.
+
+    Strategies whose planners are of different kinds are groups of their own.
 
     Raises:
       InputError: a point whose grid does not fit the area.
     """
+    strategies = [find_strategy(item) if isinstance(item, str) else item for item in strategies]
+    points = tuple(points)
+    for name in {name for point in points for name in point.planner}:
+        if not any(name in numbers_of(item.planner) for item in strategies):
+            own = sorted({known for item in strategies for known in numbers_of(item.planner)})
+            there = f"they have {', '.join(own)}" if own else "they have none"
+            raise InputError(f"no planner of these strategies has this number; {there}", field=f"axis planner.{name}")
     together: dict[tuple, list[Point]] = {}
     for point in points:
         simulated = point.mission.executor in SIMULATED
         walk = point.mission.walk if simulated else None
         camera = point.mission.camera if point.mission.sensor in RENDERED else None
         together.setdefault((program(point.mission, (SIZE_X, SIZE_Y)), walk, camera), []).append(point)
-    return tuple(group(*key, members, strategies) for key, members in together.items())
+    kinds: dict[tuple, list[Strategy]] = {}
+    for item in strategies:
+        kinds.setdefault(kind_of(item), []).append(item)
+    return tuple(group(*key, members, kind) for key, members in together.items() for kind in kinds.values())
+
+
+def numbers_of(planner: Planner | None) -> tuple[str, ...]:
+    """The fields of a planner that a sweep may change."""
+    if planner is None or not is_dataclass(planner):
+        return ()
+    fixed = ("static", "derived")
+    return tuple(f.name for f in fields(planner) if not any(f.metadata.get(word) for word in fixed))
+
+
+def with_numbers(planner: Planner | None, numbers: Mapping[str, float]) -> Planner | None:
+    """The planner with those of the numbers that it has."""
+    known = {name: type(getattr(planner, name))(numbers[name]) for name in numbers_of(planner) if name in numbers}
+    return replace(planner, **known) if known else planner
+
+
+def kind_of(strategy: Strategy) -> tuple:
+    """What decides the program of a strategy: the structure of its planner, and the shapes of its numbers."""
+    leaves, structure = jax.tree.flatten(strategy.planner)
+    return structure, *((np.shape(leaf), np.asarray(leaf).dtype.kind) for leaf in leaves)
 
 
 def group(
@@ -77,14 +127,17 @@ def group(
     walk: WalkConfig | None,
     camera: CameraConfig | None,
     points: Sequence[Point],
-    strategies: Sequence[str],
+    strategies: Sequence[Strategy],
 ) -> Group:
     """The points of one program."""
     settings = []
     for point in points:
         first = point.mission.settings(strategies[0])
         cutting = point.mission.corner_cutting
-        settings += [replace(first, strategy=strategy(name, cutting)) for name in strategies]
+        for item in strategies:
+            own = with_numbers(item.planner, point.planner)
+            planner = first.planner if own is None else traced_planner(own)
+            settings.append(replace(first, strategy=item.flags(cutting), planner=planner))
     different = list(dict.fromkeys(point.population for point in points))
     drawn = different == [PopulationConfig()]
     return Group(
@@ -92,18 +145,24 @@ def group(
         walk=walk,
         camera=camera,
         points=tuple(point.index for point in points),
+        strategies=tuple(item.name for item in strategies),
         settings=stack(settings),
         populations=None if drawn else stack([population.traced() for population in different]),
         population_of=np.repeat([different.index(point.population) for point in points], len(strategies)),
     )
 
 
-def shards(config: StudyConfig, groups: int) -> tuple[Shard, ...]:
-    """All shards of a study, numbered group by group; a function of the config alone."""
+def shards(config: StudyConfig, groups: int, *, swept: bool = False) -> tuple[Shard, ...]:
+    """All shards of a study; a function of the config alone.
+
+    They are numbered block by block, so that a study that ends early has all strategies on its arenas. Those of a sweep
+    are numbered group by group: a program is compiled when the one before it is no longer needed.
+    """
     size = min(config.shard, config.arenas)
     firsts = range(0, config.arenas, size)
+    pairs = [(group, first) for group in range(groups) for first in firsts]
+    if not swept:
+        pairs.sort(key=lambda pair: (pair[1], pair[0]))
     return tuple(
-        Shard(group * len(firsts) + block, group, first, min(size, config.arenas - first))
-        for group in range(groups)
-        for block, first in enumerate(firsts)
+        Shard(number, group, first, min(size, config.arenas - first)) for number, (group, first) in enumerate(pairs)
     )

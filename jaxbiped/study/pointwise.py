@@ -11,7 +11,7 @@ import polars as pl
 
 from jaxbiped.study.comparison import ALL, QUESTION, PairComparison, compare_pair
 from jaxbiped.study.intervals import Estimate, proportion
-from jaxbiped.study.schema import STRATEGIES
+from jaxbiped.study.schema import ordered
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,7 @@ def pointwise(
       config: of the manifest; tells the reference.
       seed: of the bootstraps; each has its own stream from it.
     """
-    present = set(frame["strategy"])
-    strategies = tuple(name for name in STRATEGIES if name in present)
+    strategies = ordered(frame["strategy"])
     pair, reference = asked(strategies), own_point(points, config)
     sides = {key: rows for key, rows in frame.sort("arena").partition_by("point", "strategy", as_dict=True).items()}
     rng, results = np.random.default_rng(seed), []

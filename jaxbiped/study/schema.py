@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import polars as pl
 
 from jaxbiped.errors import InputError
 
 REACHED = "reached"
-CODES = (REACHED, "no_path", "stuck", "collided", "fell", "out_of_bounds", "out_of_steps", "invalid")
-STRATEGIES = ("full", "bump_aware", "gate_aware", "floor_only", "blind_stop")  # the order of every table and figure
+CODES = (
+    *(REACHED, "no_path", "stuck", "collided", "fell", "out_of_bounds", "out_of_steps", "invalid"),
+    *("planner_failed", "planner_timeout"),
+)
+STRATEGIES = ("full", "bump_aware", "gate_aware", "floor_only", "blind_stop")  # that are built in, in their order
+STRATEGY_NAME = r"^[A-Za-z][\w .+-]{0,39}$"
 FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")  # of a study that names none
 MOVING = frozenset({"traffic"})
 KNOWN = (*FAMILIES, *MOVING)
@@ -21,7 +27,7 @@ SCHEMA = pl.Schema(
         "arena": pl.Int64,  # k of fold_in(key(seed), k): what pairs the strategies
         "family": pl.String,  # one of KNOWN, or SCENE
         "difficulty": pl.Float32,  # 0 (easy) to 1 (hard)
-        "strategy": pl.String,  # one of STRATEGIES
+        "strategy": pl.String,  # its name
         "code": pl.String,  # one of CODES: how the mission ended
         "success": pl.Boolean,  # code == REACHED
         "distance": pl.Float64,  # [m] walked; null unless reached
@@ -36,9 +42,19 @@ SCHEMA = pl.Schema(
         "reachable": pl.Boolean,  # a plan exists for this strategy with perfect knowledge (the oracle plan)
         "oracle_cost": pl.Float64,  # that plan's cost; null where there is none
         "oracle_length": pl.Float64,  # [m] that plan's length; null where there is none
+        "planning_calls": pl.Int32,  # plans that were made
+        "planning_time": pl.Float64,  # [s] that they took; null inside a compiled program, where it cannot be told
+        "plan_cost": pl.Float64,  # of the first way that was found, by Eq. 1; null where that is not known
     }
 )
-NULLABLE = ("distance", "time", "oracle_cost", "oracle_length")
+ADDED = ("planning_calls", "planning_time", "plan_cost")  # null in rows that older versions wrote
+NULLABLE = ("distance", "time", "oracle_cost", "oracle_length", *ADDED)
+
+
+def ordered(names: Iterable[str]) -> tuple[str, ...]:
+    """Names of strategies in the order of every table and figure: those that are built in, then the others."""
+    names = set(names)
+    return (*(name for name in STRATEGIES if name in names), *sorted(names - set(STRATEGIES)))
 
 
 def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
@@ -49,6 +65,7 @@ def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
     `walked`, `elapsed`, `goal_distance` and the errors of a mission that ended as `invalid`.
     """
     where = {"file": str(file)} if file is not None else {}
+    frame = frame.with_columns(pl.lit(None, SCHEMA[name]).alias(name) for name in ADDED if name not in frame.columns)
     for name, dtype in SCHEMA.items():
         if name not in frame.columns:
             raise InputError(f"column missing; rows have {', '.join(SCHEMA)}", field=name, **where)
@@ -74,7 +91,7 @@ def rules() -> dict[str, tuple[pl.Expr, str]]:
     reached, invalid = pl.col("code") == REACHED, pl.col("code") == "invalid"
     checks = {
         "code": (~pl.col("code").is_in(CODES), f"must be one of {', '.join(CODES)}"),
-        "strategy": (~pl.col("strategy").is_in(STRATEGIES), f"must be one of {', '.join(STRATEGIES)}"),
+        "strategy": (~pl.col("strategy").str.contains(STRATEGY_NAME), "must be the name of a strategy"),
         "family": (~pl.col("family").is_in([*KNOWN, SCENE]), f"must be one of {', '.join([*KNOWN, SCENE])}"),
         "success": (pl.col("success") != reached, "must be true exactly where the code is reached"),
     }
@@ -87,6 +104,9 @@ def rules() -> dict[str, tuple[pl.Expr, str]]:
     for name in ("oracle_cost", "oracle_length"):
         wrong = pl.col(name).is_not_null() & (~pl.col("reachable") | ~pl.col(name).is_finite())
         checks[name] = (wrong, "must be finite or null, and null where the goal is not reachable")
+    for name in ("planning_time", "plan_cost"):
+        checks[name] = (~pl.col(name).is_finite() | (pl.col(name) < 0), "must be finite and not negative, or null")
+    checks["planning_calls"] = (pl.col("planning_calls") < 0, "must not be negative")
     checks["difficulty"] = (~pl.col("difficulty").is_finite(), "must be finite")
     named = {name: checks.get(name, (pl.lit(False), "")) for name in SCHEMA}
     return {

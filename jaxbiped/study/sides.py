@@ -10,7 +10,7 @@ import polars as pl
 
 from jaxbiped.errors import InputError
 from jaxbiped.study.comparison import QUESTION, Comparison, compare_named
-from jaxbiped.study.schema import STRATEGIES
+from jaxbiped.study.schema import ordered
 from jaxbiped.study.store import Manifest, read, read_points
 
 
@@ -94,8 +94,7 @@ def choose(
 
 def present(frame: pl.DataFrame) -> tuple[str, ...]:
     """The strategies that have rows, in the order of tables."""
-    there = set(frame["strategy"].unique())
-    return tuple(name for name in STRATEGIES if name in there)
+    return ordered(frame["strategy"].unique())
 
 
 def check(side: Side, option: str) -> None:

@@ -24,7 +24,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
-from jaxbiped.study.schema import SCHEMA, STRATEGIES, validate
+from jaxbiped.study.schema import ADDED, SCHEMA, ordered, validate
 from jaxbiped.terminal import command_line
 
 POINTS, ROWS = "points.parquet", "rows"
@@ -211,7 +211,8 @@ def read(folder: str | Path) -> tuple[pl.DataFrame, Manifest]:
             raise broken_shard(path, error) from None
     check_complete(folder, manifest, sum(len(frame) for frame in frames))
     frame = pl.concat(frames) if frames else pl.DataFrame(schema=SCHEMA)
-    return validate(frame, file=folder).sort("point", "arena", pl.col("strategy").cast(pl.Enum(STRATEGIES))), manifest
+    strategy = pl.col("strategy").cast(pl.Enum(ordered(frame["strategy"].unique())))
+    return validate(frame, file=folder).sort("point", "arena", strategy), manifest
 
 
 def scan(folder: str | Path) -> pl.LazyFrame:
@@ -225,9 +226,11 @@ def scan(folder: str | Path) -> pl.LazyFrame:
             schema = pl.read_parquet_schema(path)
         except UNREADABLE as error:
             raise broken_shard(path, error) from None
-        if dict(schema) != dict(SCHEMA):
+        if {name: SCHEMA[name] for name in ADDED} | dict(schema) != dict(SCHEMA):
             raise InputError(f"is not a shard of this format; its columns must be {', '.join(SCHEMA)}", file=path)
-    return pl.scan_parquet(paths) if paths else pl.LazyFrame(schema=SCHEMA)
+    if not paths:
+        return pl.LazyFrame(schema=SCHEMA)
+    return pl.scan_parquet(paths, schema=dict(SCHEMA), missing_columns="insert")
 
 
 def read_points(folder: str | Path) -> pl.DataFrame:

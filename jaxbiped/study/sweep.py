@@ -21,7 +21,7 @@ from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Point
 from jaxbiped.study.memory import most_points
 
-POPULATION = "population"
+POPULATION, PLANNER = "population", "planner"
 OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # numbers that may be left out
 EXAMPLES = "costs.c3, pitch, stereo.sd, robot.radius or population.bump_width"
 
@@ -75,12 +75,18 @@ class SweepConfig(StudyConfig):
         for name in fields:
             if fields.count(name) > 1:
                 raise InputError("is swept twice; a field can be in one axis", field=f"axis {name}")
+            if name.startswith(f"{PLANNER}."):
+                check_planner_field(name)
+                continue
             check_field(name, mission | {POPULATION: population})
             family = FAMILY_OF.get(name.removeprefix(f"{POPULATION}."))
             if family and family not in self.families:
                 raise InputError(f"needs the family {family} among the families", field=f"axis {name}")
         own = []
         if self.base:
+            for name in fields:
+                if name.startswith(f"{PLANNER}."):
+                    raise InputError("a planner's number has no value in the config for the base point", field=name)
             leaves = dict(flat(mission | {POPULATION: population}))
             own = [{name: leaves[name] for name in fields}]
             for name in fields:
@@ -103,8 +109,11 @@ class SweepConfig(StudyConfig):
 
 def point_at(index: int, values: dict[str, float], mission: dict[str, Any], population: dict[str, Any]) -> Point:
     """One sweep point: the config with some of its fields replaced; InputError about the one that is not allowed."""
+    of_planner = {}
     for name, value in values.items():
-        if name.startswith(f"{POPULATION}."):
+        if name.startswith(f"{PLANNER}."):
+            of_planner[name.removeprefix(f"{PLANNER}.")] = value
+        elif name.startswith(f"{POPULATION}."):
             population = replaced(population, name.split(".")[1:], value)
         else:
             mission = replaced(mission, name.split("."), value)
@@ -113,7 +122,8 @@ def point_at(index: int, values: dict[str, float], mission: dict[str, Any], popu
         program(kind, (SIZE_X, SIZE_Y))
     except InputError as error:
         raise InputError(f"{shown(values)}: {error}", field="axes") from None
-    return Point(index, kind, validated(PopulationConfig, population, values, f"{POPULATION}."), values)
+    drawn = validated(PopulationConfig, population, values, f"{POPULATION}.")
+    return Point(index, kind, drawn, values, of_planner)
 
 
 def validated(model: type[Model], data: dict[str, Any], values: Mapping[str, float], prefix: str = ""):
@@ -137,6 +147,12 @@ def replaced(tree: dict[str, Any], path: list[str], value: float) -> dict[str, A
     """A config's values with one of them replaced."""
     name, *rest = path
     return tree | {name: replaced(tree[name], rest, value) if rest else value}
+
+
+def check_planner_field(name: str) -> None:
+    """Raise `InputError` unless a dotted name may be that of a planner's number; whether there is one shows later."""
+    if not name.removeprefix(f"{PLANNER}.").isidentifier():
+        raise InputError("must be planner.<field>", field=f"axis {name}")
 
 
 def check_field(name: str, config: Mapping[str, Any]) -> None:

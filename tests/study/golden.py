@@ -1,4 +1,4 @@
-"""Golden rows: missions of every strategy, and of the sensors, executors and planners that are JAX, as they were.
+"""Golden rows: missions of every strategy, sensor, executor, planner and way of localisation, as they were.
 
 They guard a refactoring bit for bit. `python -m tests.study.golden NAME ...` writes those of the named kinds anew, by
 default all: where a change of behaviour is wanted, and the commit that brings it says which rows changed, and why.
@@ -17,12 +17,22 @@ from jaxbiped.study.evaluate import evaluate
 
 FOLDER = Path(__file__).parents[1] / "data" / "golden"
 EVERY = {"arenas": 12}
+FEW = {"arenas": 6, "strategies": ("full",)}
 KINDS = {  # a study each; those of `QUICK` in the quick suite
     "raycast": EVERY | {"mission": {}},
     "oracle": EVERY | {"mission": {"sensor": "oracle"}},
     "sampled": EVERY | {"mission": {"executor": "sampled"}, "strategies": ("full", "floor_only")},
     "heading": EVERY | {"mission": {"planner": "heading"}, "strategies": ("full", "gate_aware")},
     "pitch": EVERY | {"mission": {"pitch": 0.1}, "strategies": ("full", "bump_aware")},
+    "traffic": FEW | {"mission": {"mapping": {"fade": 60.0}}, "families": ("traffic",)},
+    "real": FEW | {"mission": {"preset": "real"}},
+    "odometry": FEW | {"mission": {"localisation": "odometry"}},
+    "visual": FEW | {"mission": {"localisation": "visual"}},
+    "icp": FEW | {"mission": {"localisation": "icp"}},
+    "both": FEW | {"mission": {"localisation": "both", "foot_placement": True}},
+    "stereo": FEW | {"arenas": 3, "mission": {"sensor": "stereo"}},
+    "native": FEW | {"arenas": 4, "mission": {"executor": "native"}},
+    "mjx": FEW | {"arenas": 2, "mission": {"executor": "mjx"}},
 }
 QUICK = ("raycast",)
 # Programs for processors of other kinds round otherwise; rows of another kind are compared within this share.

@@ -16,8 +16,9 @@ from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.study.reproduction.account import Record, record, typical
 from jaxbiped.study.reproduction.mishaps import MISHAPS, Ending, suffer
 from jaxbiped.study.reproduction.paper import EXPERIMENTS, TABLE_1, Experiment
-from jaxbiped.study.reproduction.staging import play, seeing
+from jaxbiped.study.reproduction.staging import play
 from jaxbiped.study.reproduction.table_1 import SCENES, Shown, shown
+from jaxbiped.study.runner import seeing
 
 Done = Callable[[], None]  # called after each mission
 

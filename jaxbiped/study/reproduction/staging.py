@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, closing, nullcontext
 from pathlib import Path
 
 import jax
@@ -11,12 +10,13 @@ import jax.numpy as jnp
 
 from jaxbiped.arenas import Arena, load_scene
 from jaxbiped.errors import InputError
-from jaxbiped.mission.eyes import Eyes, eyes_for
+from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
+from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
-from jaxbiped.mission.stepped import Mission, Recorder, run_logged, turn_once
+from jaxbiped.mission.stepped import Mission, Recorder, turn_once
 from jaxbiped.sensing.hashing import from_key
+from jaxbiped.study.runner import play_one
 
 
 def load_scenes(folder: Path, names: tuple[str, ...]) -> dict[str, Arena]:
@@ -31,21 +31,9 @@ def load_scenes(folder: Path, names: tuple[str, ...]) -> dict[str, Arena]:
     return {name: load_scene(folder / f"{name}.toml")[1] for name in names}
 
 
-def seeing(config: MissionConfig) -> AbstractContextManager[Eyes | None]:
-    """What missions of a config see with, closed when it is left; None where their sensor is JAX."""
-    eyes = eyes_for(config)
-    return closing(eyes) if eyes else nullcontext()
-
-
 def play(arena: Arena, config: MissionConfig, strategy: str, seed: int, eyes: Eyes | None = None) -> Mission:
     """One mission, with its log. Consumes `jax.random.key(seed)`."""
-    static = program(config, tuple(round(float(v), 6) for v in arena.size_xy))
-    arguments = arena, config.settings(strategy), from_key(jax.random.key(seed)), static
-    if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import walk_logged  # loads MuJoCo
-
-        return walk_logged(*arguments, config=config.walk, eyes=eyes)
-    return run_logged(*arguments, eyes=eyes)
+    return play_one(arena, config, strategy, from_key(jax.random.key(seed)), eyes=eyes)
 
 
 def play_changing(

@@ -1,0 +1,1 @@
+"""What sweep scripts are written with: studies, their results, and single missions."""

@@ -1,0 +1,209 @@
+"""What a study found: its rows, and what can be asked of them."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from jaxbiped.errors import InputError
+from jaxbiped.mission.strategies import Strategy
+from jaxbiped.study import store
+from jaxbiped.study.comparison import Comparison, compare, default_pairs
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.groups import group_points, only_point, shards, strategies_of
+from jaxbiped.study.schema import ordered, validate
+from jaxbiped.study.sweep import SweepConfig
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+METRICS = ("success", "distance", "time")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Tables and sentences that show themselves: as text, in a terminal, and as HTML in a notebook."""
+
+    what: Callable[[], Any]  # makes a renderable of rich
+
+    def __rich__(self):
+        return self.what()
+
+    def text(self, html: bool = False, width: int = 100) -> str:
+        """The same as text or as HTML."""
+        from rich.console import Console
+
+        console = Console(file=io.StringIO(), record=True, width=width, force_jupyter=False)
+        console.print(self.what(), highlight=False)
+        if html:
+            return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+        return console.export_text().rstrip("\n")
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def __repr__(self) -> str:
+        return self.text()
+
+    def _repr_html_(self) -> str:
+        return self.text(html=True)
+
+
+@dataclass(frozen=True, repr=False)
+class Compared(Table):
+    """Paired statistics of strategies at one sweep point."""
+
+    statistics: Comparison | None = None  # the numbers that the tables show
+
+
+@dataclass(frozen=True)
+class Results:
+    """The rows of a study or a sweep."""
+
+    rows: pl.DataFrame  # of `study.schema.SCHEMA`: one for each sweep point, arena and strategy
+    points: pl.DataFrame  # `point`, and a column for each field that is swept
+    config: dict[str, Any]  # of the study, as it is stored
+    folder: Path | None = None  # where it is stored
+    own: tuple[Strategy, ...] = ()  # strategies that are not built in
+
+    @classmethod
+    def of(cls, rows: pl.DataFrame, points: pl.DataFrame, config: StudyConfig, own: Sequence[Strategy]) -> Results:
+        """Of rows in any order."""
+        rank = pl.col("strategy").cast(pl.Enum(ordered(rows["strategy"].unique())))
+        return cls(validate(rows).sort("point", "arena", rank), points, config.model_dump(mode="json"), None, tuple(own))
+
+    @property
+    def strategies(self) -> tuple[str, ...]:
+        """Their names, in the order of tables."""
+        return ordered(self.rows["strategy"].unique())
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The fields that are swept."""
+        return tuple(name for name in self.points.columns if name != "point")
+
+    def compare(
+        self, first: str | None = None, second: str | None = None, *, point: int = 0, resamples: int = 4999
+    ) -> Compared:
+        """Two strategies on the same arenas: success, distance and time, with intervals and corrected p-values.
+
+        Args:
+          first, second: differences are first minus second; by default all usual pairs.
+          point: sweep point.
+          resamples: of the bootstraps.
+
+        Raises:
+          InputError: a strategy or a point that is not there, or one strategy twice.
+        """
+        for side, name in (("first", first), ("second", second)):
+            if name is not None and name not in self.strategies:
+                raise InputError(f"must be one of {', '.join(self.strategies)}", field=side, value=name)
+        if (first is None) != (second is None) or (first is not None and first == second):
+            raise InputError("must be two strategies, or none for all usual pairs", field="first, second")
+        pairs = [(first, second)] if first else default_pairs(self.strategies)
+        rows = self.rows.filter(pl.col("strategy").is_in([first, second])) if first else self.rows
+        found = compare(rows, point=point, pairs=pairs, seed=self.config["seed"], resamples=resamples)
+
+        def shown():
+            from jaxbiped.report.tables import terminal
+
+            return terminal(found)
+
+        return Compared(shown, found)
+
+    def summary(self) -> Table:
+        """Each strategy by itself, or success at each point of a sweep."""
+        if not self.axes:
+            return self.compare()
+
+        def shown():
+            from rich.console import Group
+
+            from jaxbiped.report.sweep import sheets
+            from jaxbiped.report.tables import to_rich
+
+            return Group(*(to_rich(sheet) for sheet in sheets(self.pointwise)))
+
+        return Table(shown)
+
+    @cached_property
+    def pointwise(self):
+        """The statistics of every sweep point (`study.pointwise.SweepResult`)."""
+        from jaxbiped.study.pointwise import analyse
+
+        return analyse(self.rows, self.points, self.config, seed=self.config["seed"])
+
+    def plot(self, metric: str = "success") -> Figure:
+        """Each strategy's own metric with intervals, over the axis of a sweep or side by side.
+
+        Args:
+          metric: success, distance or time; distance and time are means over a strategy's own reached missions.
+
+        Raises:
+          InputError: another metric; a sweep of several fields.
+        """
+        if metric not in METRICS:
+            raise InputError(f"must be one of {', '.join(METRICS)}", field="metric", value=metric)
+        if len(self.axes) > 1:
+            raise InputError("draws one field; filter `rows` and `points` for the others", field="plot", value=self.axes)
+        from jaxbiped.report.own_metric import own_metric
+
+        return own_metric(self.rows, self.points, metric)
+
+    def save(self, folder: str | Path) -> Path:
+        """Store the rows in a new folder, as a study stores them; `jaxbiped report FOLDER` draws its page.
+
+        Raises:
+          InputError: a folder that exists, a full disk.
+        """
+        config = (SweepConfig if "axes" in self.config else StudyConfig).model_validate(self.config)
+        points = tuple(config.points()) if self.axes else only_point(config)
+        groups = group_points(points, strategies_of(config))
+        swept = self.points if self.axes else None
+        with store.create(folder, config, seed=config.seed, arenas=config.arenas, points=swept) as results:
+            for shard in shards(config, len(groups), swept=bool(self.axes)):
+                here, arena = groups[shard.group], pl.col("arena")
+                mine = pl.col("point").is_in(here.points) & pl.col("strategy").is_in(here.strategies)
+                block = (arena >= shard.first) & (arena < shard.first + shard.count)
+                results.append(self.rows.filter(mine & block), shard.number)
+            results.finish()
+        return Path(folder)
+
+    def replay(self, strategy: str, arena: int, point: int = 0):
+        """One mission of the study played again, with its log.
+
+        Raises:
+          InputError: a strategy, arena or point that is not there; a strategy whose code is not what it was.
+        """
+        from jaxbiped.api.run import PlayedMission
+        from jaxbiped.study.again import play_again
+        from jaxbiped.study.manifest import Manifest
+
+        where = (pl.col("strategy") == strategy) & (pl.col("arena") == arena) & (pl.col("point") == point)
+        if self.rows.filter(where).is_empty():
+            raise InputError("no such mission in these rows", field="replay", value=(strategy, arena, point))
+        values = self.points.filter(pl.col("point") == point).row(0, named=True)
+        values = {name: value for name, value in values.items() if name != "point"}
+        manifest = Manifest.model_construct(config=self.config, seed=self.config["seed"])
+        own = {item.name: item for item in self.own}
+        mission = play_again(manifest, point, values, strategy, [arena], own)[0]
+        return PlayedMission(f"arena {arena}", strategy, mission)
+
+    def __rich__(self):
+        return self.summary().__rich__()
+
+    def __str__(self) -> str:
+        return str(self.summary())
+
+    def __repr__(self) -> str:
+        what = f"{len(self.rows)} rows: {len(self.points)} point(s), {self.rows['arena'].n_unique()} arenas"
+        return f"Results({what}, {', '.join(self.strategies)})"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()

@@ -1,0 +1,201 @@
+"""The functions of a sweep script: studies are evaluated, single missions played."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import polars as pl
+
+from jaxbiped.api.results import Results
+from jaxbiped.api.study import Study, named
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.scene import load_scene
+from jaxbiped.errors import InputError
+from jaxbiped.files import new_folder, write_whole
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.stepped import Mission, Played
+from jaxbiped.mission.strategies import STRATEGIES, Strategy, find_strategy
+from jaxbiped.planning.planners import Planner
+from jaxbiped.sensing.hashing import from_key
+from jaxbiped.study import store
+from jaxbiped.study.conduct import conduct, table
+from jaxbiped.study.evaluate import Progress
+from jaxbiped.study.evaluate import evaluate as evaluate_shards
+from jaxbiped.study.runner import check_mission, play_one, seeing
+
+
+def evaluate(
+    study: Study, out: str | Path | None = None, on_progress: Callable[[Progress], None] | None = None
+) -> Results:
+    """Play every strategy on every arena of a study.
+
+    Args:
+      out: folder to store the rows in, shard by shard; by default they are kept in memory alone (see `Results.save`).
+        A study that was stopped there is gone on with.
+      on_progress: called now and then.
+
+    Raises:
+      InputError: something that cannot be run on this machine, or a folder that holds something else.
+    """
+    return _evaluated(study, None, out, on_progress)
+
+
+def sweep(
+    study: Study,
+    axes: Mapping[str, Sequence[float]],
+    out: str | Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> Results:
+    """The same at every combination of values: `{"costs.c3": [2, 5, 10], "planner.clearance": [0, 0.1]}`.
+
+    Args:
+      axes: dotted fields of the mission's config, `population.<field>`, or `planner.<field>` of your own planner.
+      out, on_progress: as of `evaluate`.
+
+    Raises:
+      InputError: as `evaluate`; a field that is not there, or a value that it does not allow.
+    """
+    if not axes:
+        raise InputError("must name one field at least", field="axes")
+    return _evaluated(study, dict(axes), out, on_progress)
+
+
+def _evaluated(study: Study, axes, out, on_progress) -> Results:
+    config = study.config(axes)
+    points = tuple(config.points()) if axes else None
+    for mission in {point.mission for point in points} if points else {config.mission}:
+        check_mission(mission)
+    if out is not None:
+        conduct(out, config, points=points, resume=Path(out).exists(), on_progress=on_progress)
+        return load(out, own=study.own)
+    frames = [frame for _, frame in evaluate_shards(config, on_progress, points=points)]
+    swept = table(points) if points else pl.DataFrame({"point": [0]}, schema={"point": pl.Int32})
+    return Results.of(pl.concat(frames), swept, config, study.own)
+
+
+def load(folder: str | Path, own: Sequence[Strategy | Planner] = ()) -> Results:
+    """What a study stored in a folder, by this or by the command line; nothing that it names is imported.
+
+    Args:
+      own: strategies of the study that are not built in, where missions are to be played again.
+
+    Raises:
+      InputError: no results folder, or a damaged one.
+    """
+    frame, manifest = store.read(folder)
+    return Results(frame, store.read_points(folder), manifest.config, Path(folder), tuple(map(named, own)))
+
+
+@dataclass(frozen=True)
+class PlayedMission:
+    """One mission that has ended, with its log."""
+
+    name: str  # of the scene
+    strategy: str
+    mission: Mission
+
+    @property
+    def code(self) -> str:
+        """How it ended: "reached", say."""
+        return self.mission.code.label
+
+    @property
+    def distance(self) -> float:
+        """[m] walked."""
+        return self.mission.distance
+
+    @property
+    def time(self) -> float:
+        """[s] taken."""
+        return self.mission.time
+
+    @property
+    def log(self):
+        """Maps, poses and plans of every decision (`MissionLog`)."""
+        return self.mission.log
+
+    def __str__(self) -> str:
+        minutes = self.time / 60
+        return (
+            f"{self.name}, {self.strategy}: {self.code.replace('_', ' ')}, {100 * self.distance:.0f} cm in "
+            f"{self.time:.0f} s ({minutes:.1f} min), {self.mission.measurements} measurements"
+        )
+
+    def save(self, folder: str | Path) -> tuple[Path, ...]:
+        """Write `map.png`, `mission.gif`, `mission.json` and the log into a new folder; the files.
+
+        Raises:
+          InputError: a folder that exists or cannot be written.
+        """
+        from jaxbiped.mission.recording import FILE, save_log
+        from jaxbiped.report.animation import save_gif
+        from jaxbiped.report.pictures import save_mission
+
+        facts = {"scene": self.name, "strategy": self.strategy, "code": self.code, "distance": self.distance}
+        facts |= {"time": self.time, "measurements": self.mission.measurements}
+        with new_folder(Path(folder)) as new:
+            save_mission(new / "map.png", self.log, title=str(self))
+            save_gif(new / "mission.gif", self.log, title=f"{self.name}, {self.strategy}")
+            text = json.dumps(facts, indent=2) + "\n"
+            write_whole(new / "mission.json", lambda file: file.write(text.encode()))
+            save_log(new / FILE, self.log, facts)
+        return tuple(sorted(Path(folder).iterdir()))
+
+
+def play(
+    scene: str | Path | Arena,
+    strategy: str | Strategy | Planner = "full",
+    mission: MissionConfig | None = None,
+    *,
+    seed: int = 0,
+    on_decision: Callable[[Played], None] = lambda _: None,
+) -> PlayedMission:
+    """One mission in a scene, with a log of everything.
+
+    Consumes `jax.random.key(seed)`.
+
+    Args:
+      scene: a TOML file, or an arena.
+      strategy: a name, or a strategy, planner or function of your own.
+
+    Raises:
+      InputError: a scene that is wrong, a strategy that is not known, something that cannot be run on this machine.
+    """
+    name, arena = ("arena", scene) if isinstance(scene, Arena) else load_scene(scene)
+    config = MissionConfig() if mission is None else mission
+    chosen = find_strategy(strategy) if isinstance(strategy, str) else named(strategy)
+    check_mission(config)
+    with seeing(config) as eyes:
+        played = play_one(arena, config, chosen, from_key(jax.random.key(seed)), on_decision, eyes)
+    return PlayedMission(name, chosen.name, played)
+
+
+def register(thing: Strategy | Planner | Callable, name: str | None = None, *, replace: bool = False) -> str:
+    """Give a strategy, a planner or a planning function a name that commands, studies and tables know it by.
+
+    Args:
+      name: by default its own.
+      replace: whether it may take the place of another one that is not built in.
+
+    Returns:
+      The name.
+
+    Raises:
+      InputError: a name that is taken, or cannot be one.
+    """
+    strategy = named(thing) if name is None else as_named(thing, name)
+    from jaxbiped.study.schema import STRATEGIES as BUILT_IN
+
+    STRATEGIES.add(strategy.name, strategy, replace=replace and strategy.name not in BUILT_IN)
+    return strategy.name
+
+
+def as_named(thing: Strategy | Planner | Callable, name: str) -> Strategy:
+    """The same under another name."""
+    from dataclasses import replace
+
+    return replace(named(thing), name=name)

@@ -1,0 +1,109 @@
+"""What exists under which name: one list of names for each kind of component.
+
+Names come from this package, from `register`, and from entry points of other packages; `package.module:name` stands for
+what a module holds, and needs no registration.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import sys
+from collections.abc import Callable, Iterator
+from importlib import metadata
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from jaxbiped.errors import InputError
+
+T = TypeVar("T")
+PLACE = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")  # package.module:name
+
+
+class Registry(Generic[T]):
+    """Names and what they stand for, in the order in which they came; that is the order of tables, too.
+
+    Args:
+      kind: "strategy", say; for messages.
+      group: of entry points.
+    """
+
+    def __init__(self, kind: str, group: str):
+        self.kind, self.group = kind, group
+        self.held: dict[str, T] = {}
+
+    def add(self, name: str, thing: T, *, replace: bool = False) -> T:
+        """Give a name to something, and return it.
+
+        Raises:
+          InputError: a name that is taken by something else, unless it is to be replaced.
+        """
+        taken = self.held.get(name)
+        if taken is not None and taken != thing and not replace:
+            raise InputError(f"is taken; two {self.kind} entries cannot have one name", field="name", value=name)
+        self.held[name] = thing
+        return thing
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.held)
+
+    def __len__(self) -> int:
+        return len(self.held)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.held
+
+    def names(self) -> tuple[str, ...]:
+        """All names that are registered."""
+        return tuple(self.held)
+
+    def knows(self, name: str) -> bool:
+        """Whether a name is registered, or that of an entry point; nothing is imported."""
+        return name in self.held or any(point.name == name for point in self.entry_points())
+
+    def find(self, name: str, convert: Callable[[object, str], T]) -> T:
+        """What a name stands for.
+
+        Args:
+          convert: makes an entry of what a module holds, and of the name that it has there.
+
+        Raises:
+          InputError: an unknown name, a module that cannot be imported, or that does not hold such a thing.
+        """
+        if name in self.held:
+            return self.held[name]
+        for point in self.entry_points():
+            if point.name == name:
+                return self.add(name, convert(load(point.value, self.kind), name))
+        if PLACE.fullmatch(name):
+            return convert(load(name, self.kind), name.rpartition(":")[2])
+        known = ", ".join(dict.fromkeys([*self.held, *(point.name for point in self.entry_points())]))
+        raise InputError(f"must be one of {known}, or package.module:name", field=self.kind, value=name)
+
+    def entry_points(self) -> Iterator[metadata.EntryPoint]:
+        """What other packages offer."""
+        yield from metadata.entry_points(group=self.group)
+
+
+def load(place: str, kind: str) -> object:
+    """What `package.module:name` stands for; modules are looked for in the working directory, too.
+
+    Raises:
+      InputError: no such module or name, or a module that raises an error when it is imported.
+    """
+    module, _, name = place.partition(":")
+    here = str(Path.cwd())
+    added = here not in sys.path
+    if added:
+        sys.path.append(here)
+    try:
+        found = importlib.import_module(module)
+    except Exception as error:
+        said = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise InputError(f"module {module} cannot be imported: {said}", field=kind, value=place) from None
+    finally:
+        if added:
+            sys.path.remove(here)
+    if not hasattr(found, name):
+        raise InputError(f"module {module} has no {name}", field=kind, value=place)
+    return getattr(found, name)

@@ -1,0 +1,210 @@
+"""Planners that are plain functions of NumPy arrays for one map, as libraries have them that know nothing of JAX."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxbiped.core.host_call import host_call
+from jaxbiped.core.time_limit import TimeLimit, time_limit
+from jaxbiped.errors import InputError
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning.costs import DIRECTIONS, Costs
+from jaxbiped.planning.planners import FAILED, FINE, TOO_SLOW, Planner, Problem, Route
+
+DIRECTION_OF = {tuple(int(d) for d in move): k for k, move in enumerate(DIRECTIONS)}
+DIAGONAL = np.sqrt(2.0)
+
+MapPlanner = Callable[[np.ndarray, np.ndarray, tuple[int, int], tuple[int, int], Costs], Any]
+
+
+@jax.tree_util.register_pytree_node_class
+@dataclass(frozen=True)
+class HostPlanner(Planner):
+    """A function that plans on one map, called on the host from inside the compiled loop.
+
+    As a pytree it is a number in the list of all functions: missions of different functions share one program.
+
+    `function(classes, levels, start_ij, goal_ij, costs) -> cells`:
+
+    - `classes` int8 [H, W]: `jaxbiped.Cell` of each cell. What the strategy does not dare is an obstacle already.
+    - `levels` int8 [H, W]: of the ground; between neighbours that differ by more than one there is no way.
+    - `start_ij`, `goal_ij`: row and column.
+    - `costs`: `Costs` of Eq. 1 on this pitch, plain floats.
+    - `cells`: integers [L, 2] from the start to the goal, each a neighbour of the one before, or None where there is no
+      way. A diagonal move must not pass a blocked cell, unless `corner_cutting` allows it.
+
+    A function that raises an error, or returns anything else, ends its mission as `planner_failed`, and the first such
+    error of a process is told on stderr; one that takes longer than `limit` ends it as `planner_timeout`. Python code
+    is interrupted then; a library's compiled code is first let return.
+    """
+
+    function: MapPlanner = field(metadata={"static": True})
+    limit: float = field(default=10.0, metadata={"static": True})  # [s] for one plan
+    number: Any = field(default=None, repr=False, compare=False, metadata={"derived": True})
+
+    def __post_init__(self):
+        if not callable(self.function):
+            raise InputError("must be a function", field="HostPlanner", value=self.function)
+        if not 0 < self.limit < 1e6:
+            raise InputError("must be above 0 s", field="HostPlanner: limit", value=self.limit)
+        object.__setattr__(self, "number", np.int32(number_of(self.function, self.limit)))
+
+    def tree_flatten(self):
+        """Its number."""
+        return (self.number,), None
+
+    @classmethod
+    def tree_unflatten(cls, _, leaves):
+        """Of the same number, perhaps traced or of a batch."""
+        made = object.__new__(cls)
+        for name, value in (("function", None), ("limit", None), ("number", leaves[0])):
+            object.__setattr__(made, name, value)
+        return made
+
+    def plan_batch(self, problem: Problem) -> Route:
+        """See `Planner`."""
+        count, length = problem.start_ij.shape[0], max(problem.length, 3 * sum(problem.shape))
+        reals = jax.ShapeDtypeStruct((count,), np.float32)
+        whole = jax.ShapeDtypeStruct((count, length), np.int8)
+        costs = jnp.stack(jnp.broadcast_arrays(*jax.tree.leaves(problem.costs), reals_like(count))[:-1], axis=-1)
+        flags = problem.rules.corner_cutting, problem.rules.bumps, problem.rules.gates
+        rules = jnp.stack([jnp.broadcast_to(flag, (count,)) for flag in flags], axis=-1)
+        moves, cost, seconds, fault = host_call(
+            answer,
+            [whole, reals, reals, jax.ShapeDtypeStruct((count,), np.int8)],
+            problem.classes.astype(jnp.int8),
+            problem.levels.astype(jnp.int8),
+            problem.start_ij.astype(jnp.int32),
+            problem.goal_ij.astype(jnp.int32),
+            costs.astype(jnp.float32),
+            rules,
+            problem.active,
+            jnp.broadcast_to(self.number, (count,)).astype(jnp.int32),
+        )
+        return Route(moves, None, cost, seconds, fault)
+
+
+def reals_like(count: int) -> jax.Array:
+    """What numbers of a batch are broadcast to."""
+    return jnp.zeros(count, jnp.float32)
+
+
+KNOWN: dict[tuple[MapPlanner, float], int] = {}
+FUNCTIONS: list[tuple[MapPlanner, float]] = []  # with their limits, by their numbers
+LOCK = threading.Lock()
+
+
+def number_of(function: MapPlanner, limit: float) -> int:
+    """Its place in the list of this process."""
+    with LOCK:
+        known = KNOWN.setdefault((function, limit), len(FUNCTIONS))
+        if known == len(FUNCTIONS):
+            FUNCTIONS.append((function, limit))
+        return known
+
+
+def answer(classes, levels, start, goal, costs, rules, active, numbers):
+    """The routes of a batch, each by the function of its number: moves, costs, seconds and faults."""
+    count, length = len(start), 3 * sum(classes.shape[1:])
+    moves = np.full((count, length), -1, np.int8)
+    cost, seconds = np.full(count, np.nan, np.float32), np.zeros(count, np.float32)
+    fault = np.full(count, FINE, np.int8)
+    for k in np.flatnonzero(active):
+        function, limit = FUNCTIONS[numbers[k]]
+        cutting, bumps, gates = (bool(flag) for flag in rules[k])
+        grid = dared(classes[k], bumps, gates)
+        own = Costs(*(float(value) for value in costs[k]))
+        begun = time.perf_counter()
+        fault[k], way = call(function, limit, grid.copy(), levels[k].copy(), start[k], goal[k], own)
+        seconds[k] = time.perf_counter() - begun
+        if way is not None:
+            try:
+                found, cost[k] = read_way(way, grid, levels[k], start[k], goal[k], own, cutting)
+                moves[k, : min(length, len(found))] = found[:length]
+            except ValueError as error:
+                fault[k] = FAILED
+                tell(function, str(error))
+    return moves, cost, seconds, fault
+
+
+def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs: Costs) -> tuple[int, Any]:
+    """The fault of one call, and what it returned."""
+    start, goal = (tuple(int(v) for v in cell) for cell in (start, goal))
+    try:
+        with time_limit(limit):
+            return FINE, function(classes, levels, start, goal, costs)
+    except TimeLimit:
+        return TOO_SLOW, None
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        tell(function, f"{type(error).__name__}: {error} ({place.name}, line {place.lineno})")
+        return FAILED, None
+
+
+def dared(classes: np.ndarray, bumps: bool, gates: bool) -> np.ndarray:
+    """A copy of a map on which what is not dared is an obstacle."""
+    grid = classes.copy()
+    if not bumps:
+        grid[grid == Cell.BUMP] = Cell.OBSTACLE
+    if not gates:
+        grid[grid == Cell.GATE] = Cell.OBSTACLE
+    return grid
+
+
+def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> tuple[np.ndarray, float]:
+    """The moves of a way, and what it costs by Eq. 1.
+
+    Raises:
+      ValueError: what is wrong with it.
+    """
+    cells = np.asarray(way)
+    if cells.ndim != 2 or cells.shape[1] != 2 or len(cells) == 0 or cells.dtype.kind not in "iuf":
+        raise ValueError(f"must return cells [L, 2] or None, not {cells.dtype} {list(cells.shape)}")
+    whole = cells.astype(np.int64)
+    if not np.array_equal(whole, cells):
+        raise ValueError("must return whole rows and columns")
+    if tuple(whole[0]) != tuple(start) or tuple(whole[-1]) != tuple(goal):
+        ends = f"{whole[0].tolist()} to {whole[-1].tolist()}"
+        raise ValueError(f"its way goes from {ends}, not from {list(map(int, start))} to {list(map(int, goal))}")
+    if (whole < 0).any() or (whole >= classes.shape).any():
+        raise ValueError("its way leaves the map")
+    steps = np.diff(whole, axis=0)
+    if (np.abs(steps).max(1, initial=0) != 1).any():
+        raise ValueError("its way has cells that are no neighbours of those before them")
+    solid, cost, moves = classes == Cell.OBSTACLE, 0.0, np.zeros(len(steps), np.int8)
+    for n, ((i, j), (di, dj)) in enumerate(zip(whole[:-1].tolist(), steps.tolist(), strict=True)):
+        p, q = i + di, j + dj
+        ends = classes[i, j], classes[p, q]
+        unmeasured, rise = Cell.UNMEASURED in ends, abs(int(levels[i, j]) - int(levels[p, q]))
+        if solid[i, j] or solid[p, q]:
+            raise ValueError(f"its way leads through the obstacle at {[p, q] if solid[p, q] else [i, j]}")
+        if not unmeasured and rise > 1:
+            raise ValueError(f"its way goes up or down {rise} levels between {[i, j]} and {[p, q]}")
+        sides = int(solid[i, q]) + int(solid[p, j]) if di and dj else 0
+        if sides == 2 or (sides == 1 and not cutting):
+            raise ValueError(f"its way cuts the corner of an obstacle between {[i, j]} and {[p, q]}")
+        motion = costs.c4 if unmeasured else costs.c3 if rise else costs.c2 if Cell.GATE in ends else costs.c1
+        cost += costs.c0 * (DIAGONAL if di and dj else 1.0) + motion
+        moves[n] = DIRECTION_OF[di, dj]
+    return moves, cost
+
+
+TOLD: set = set()
+
+
+def tell(function: MapPlanner, message: str) -> None:
+    """Say on stderr what is wrong with a planner, once in a process: a study of thousands of missions goes on."""
+    if function not in TOLD:
+        TOLD.add(function)
+        name = getattr(function, "__qualname__", type(function).__name__)
+        print(f"jaxbiped: warning: planner {name}: {' '.join(message.split())}", file=sys.stderr)

@@ -1,0 +1,233 @@
+"""Planners: from what a robot knows at a decision to the first moves of its way. Built in, and the base of all others.
+
+A planner is a frozen dataclass that is a pytree (`jax.tree_util.register_dataclass`): its type and its static fields
+choose the compiled program, its other fields are numbers that a sweep may change. Missions whose planners are of one
+kind share a program, whatever their numbers are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, Int8
+
+from jaxbiped.errors import InputError
+from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, cell_kinds, edge_costs, move_kind
+from jaxbiped.planning.costs import FORBIDDEN as FORBIDDEN_KIND
+from jaxbiped.planning.field import cost_to_go
+from jaxbiped.planning.field import field as cost_field
+from jaxbiped.planning.heading import HeadingField, Times, heading_field, heading_path
+from jaxbiped.planning.path import next_step, read_path
+
+FINE, FAILED, TOO_SLOW = 0, 1, 2  # faults of a plan
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Problem:
+    """What a planner is asked at one decision. Leaves of a batch have another axis [B], the first."""
+
+    classes: Int8[Array, "*B H W"]  # `mapping.Cell` of each cell, as the robot knows it
+    levels: Int8[Array, "*B H W"]  # of its ground
+    start_ij: Int[Array, "*B 2"]  # the robot's cell: row (y) and column (x)
+    goal_ij: Int[Array, "*B 2"]
+    heading: Int[Array, "*B"]  # index into `planning.DIRECTIONS` of the direction that the robot faces
+    yaw: Float[Array, "*B"]  # [rad] the same, exactly
+    costs: Costs  # of Eq. 1 on this pitch
+    rules: Rules  # what the strategy dares
+    times: Times  # [s] what the mission's clock counts for each primitive
+    unit_seconds: Float[Array, "*B"]  # [s] what a unit of Eq. 1 stands for
+    surcharge: Float[Array, "*B 8 H W"] | None  # to be added to `edge_costs`; None: nothing
+    active: Bool[Array, "*B"]  # whether the answer is used; False for slots without a mission
+    state: Any = None  # of the planner, as its last `Route` left it
+    pitch: float = field(default=0.05, metadata={"static": True})  # [m]
+    length: int = field(default=1, metadata={"static": True})  # moves that are wanted, at least 1
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the map."""
+        return self.classes.shape[-2:]
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Route:
+    """A planner's answer. Leaves of a batch have another axis [B], the first."""
+
+    directions: Int8[Array, "*B n"]  # the first moves, indices into `planning.DIRECTIONS`; -1 where there is none
+    cost_to_go: Float[Array, "*B H W"] | None = None  # what is left from each cell, for pictures
+    cost: Float[Array, "*B"] | None = None  # by Eq. 1, of the whole way; None or NaN: not known
+    seconds: Float[Array, "*B"] | None = None  # [s] that it took; None or NaN: not known
+    fault: Int8[Array, "*B"] | None = None  # FINE, FAILED or TOO_SLOW; None: fine
+    state: Any = None  # handed to the planner with its next problem
+
+
+class Planner:
+    """The base of planners: `plan` is written for one robot, and mapped over the batch.
+
+    A planner with a memory says in `initial_state` what it begins a mission with, and gives a new state in each route.
+    """
+
+    def plan(self, problem: Problem) -> Route:
+        """The first `problem.length` moves of the way from `start_ij` to `goal_ij`, fewer where the way is shorter.
+
+        Moves that the rules forbid on the map end the mission as `planner_failed`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no method `plan`")
+
+    def initial_state(self, shape: tuple[int, int]) -> Any:
+        """The state at the beginning of a mission on a map of this shape: a pytree of arrays, or None."""
+        return None
+
+    def plan_batch(self, problem: Problem) -> Route:
+        """The routes of a batch [B]; the leaves of the planner have that axis, too."""
+        route = jax.vmap(type(self).plan)(self, problem)
+        return replace(route, fault=faults(problem, route, self))
+
+    def whole_way(self, problem: Problem, route: Route) -> Int8[Array, "B n"]:
+        """All that is known of the way ahead, for pictures: moves as those of the route."""
+        return route.directions
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class GridPlanner(Planner):
+    """The least cost by Eq. 1 over cells: an exact field, and the best neighbour of the robot's cell (paper, 2.3).
+
+    A subclass may have costs of its own: see `edge_costs`.
+    """
+
+    def edge_costs(self, problem: Problem) -> Float[Array, "8 H W"]:
+        """What each move costs one robot, by default as Eq. 1 says; inf where it is forbidden.
+
+        In a subclass what Eq. 1 forbids stays forbidden, whatever it returns; costs must be finite and not negative
+        elsewhere, or inf.
+        """
+        costs = edge_costs(problem.classes, problem.levels, problem.costs, problem.rules)
+        return costs if problem.surcharge is None else costs + problem.surcharge
+
+    def plan_batch(self, problem: Problem) -> Route:
+        """See `Planner`."""
+        grids = problem.classes, problem.levels, problem.costs, problem.rules
+        if type(self).edge_costs is not GridPlanner.edge_costs:
+            return self._by_own_costs(problem)
+        if problem.surcharge is None:
+            to_go = cost_field(*grids, problem.goal_ij).cost
+            moves = next_step(to_go, *grids, problem.start_ij, problem.heading, length=problem.length)
+            return Route(moves, to_go, at(to_go, problem.start_ij))
+        moves = edge_costs(*grids) + problem.surcharge
+        to_go = cost_to_go(moves, problem.goal_ij)
+        path = read_path(to_go, moves, problem.start_ij, problem.length, problem.heading)
+        return Route(path.directions, to_go.cost)
+
+    def whole_way(self, problem: Problem, route: Route) -> Int8[Array, "B n"]:
+        """See `Planner`."""
+        return self.plan_batch(replace(problem, length=3 * sum(problem.shape))).directions
+
+    def _by_own_costs(self, problem: Problem) -> Route:
+        usual = edge_costs(problem.classes, problem.levels, problem.costs, problem.rules)
+        given = jax.vmap(type(self).edge_costs)(self, problem)
+        if given.shape != usual.shape or not jnp.issubdtype(given.dtype, jnp.floating):
+            wanted, got = list(usual.shape[1:]), f"{given.dtype} {list(given.shape[1:])}"
+            raise InputError(f"edge_costs must return float32 {wanted}, not {got}", field=type(self).__name__)
+        free = jnp.isfinite(usual)
+        wrong = jnp.any(free & ~(given >= 0), axis=(1, 2, 3))  # NaN is not, either
+        moves = jnp.where(free & (given >= 0), given.astype(jnp.float32), jnp.inf)
+        to_go = cost_to_go(moves, problem.goal_ij)
+        path = read_path(to_go, moves, problem.start_ij, 3 * sum(problem.shape), problem.heading)
+        cost = cost_along(usual, problem.start_ij, path.directions, path.valid)
+        fault = jnp.where(wrong, FAILED, FINE).astype(jnp.int8)
+        return Route(path.directions[:, : problem.length], to_go.cost, cost, fault=fault)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class HeadingPlanner(Planner):
+    """The least time over cells and headings, turns counted, by the mission's own clock. C4 alone still counts.
+
+    Deviation: the paper plans over cells, by Eq. 1 (`GridPlanner`).
+    """
+
+    def plan_batch(self, problem: Problem) -> Route:
+        """See `Planner`."""
+        field = self.field(problem)
+        path = heading_path(field, problem.start_ij, problem.yaw, problem.length)
+        return Route(path.directions, field.cost.min(1))
+
+    def whole_way(self, problem: Problem, route: Route) -> Int8[Array, "B n"]:
+        """See `Planner`."""
+        return self.plan_batch(replace(problem, length=3 * sum(problem.shape))).directions
+
+    def field(self, problem: Problem) -> HeadingField:
+        """Seconds to the goal of a batch, from each cell and heading."""
+        grids, extra = (problem.classes, problem.levels), None
+        if problem.surcharge is not None:
+            extra = problem.unit_seconds.reshape(-1, 1, 1, 1) * problem.surcharge
+        return heading_field(*grids, problem.times, problem.rules, problem.goal_ij, problem.pitch, extra)
+
+
+def at(grid: Float[Array, "B H W"], ij: Int[Array, "B 2"]) -> Float[Array, "B"]:
+    """The value of each grid at one cell."""
+    return grid[jnp.arange(grid.shape[0]), ij[:, 0], ij[:, 1]]
+
+
+def cost_along(
+    edges: Float[Array, "B 8 H W"], start_ij: Int[Array, "B 2"], directions: Int8[Array, "B n"], valid: Bool[Array, "B"]
+) -> Float[Array, "B"]:
+    """What the moves from each start cost; NaN where they lead nowhere."""
+    row, shape = jnp.arange(edges.shape[0]), jnp.array(edges.shape[2:])
+
+    def step(carry, move):
+        ij, total = carry
+        k = jnp.maximum(move, 0)
+        total = total + jnp.where(move >= 0, edges[row, k, ij[:, 0], ij[:, 1]], 0.0)
+        there = ij + jnp.where(move[:, None] >= 0, jnp.asarray(DIRECTIONS)[k], 0)
+        return (jnp.clip(there, 0, shape - 1).astype(ij.dtype), total), None
+
+    (_, total), _ = jax.lax.scan(step, (start_ij, jnp.zeros(edges.shape[0])), directions.T)
+    return jnp.where(valid, total, jnp.nan)
+
+
+def faults(problem: Problem, route: Route, planner: Planner) -> Int8[Array, "B"]:
+    """Whether the moves of each route are allowed on its map, and what the planner itself says of it.
+
+    Raises:
+      InputError: moves of another shape or type, named with the planner.
+    """
+    name, count = type(planner).__name__, problem.start_ij.shape[0]
+    moves = route.directions
+    if not (hasattr(moves, "ndim") and moves.ndim == 2 and jnp.issubdtype(moves.dtype, jnp.integer)):
+        got = f"{moves.dtype} {list(moves.shape[1:])}" if hasattr(moves, "shape") else type(moves).__name__
+        raise InputError(f"a route's directions must be integers [n], not {got}", field=name)
+    if moves.shape[1] < problem.length:
+        message = f"a route must have {problem.length} moves at least, -1 beyond its end"
+        raise InputError(message, field=name, value=list(moves.shape[1:]))
+    row, shape = jnp.arange(count), jnp.array(problem.shape)
+    kinds = cell_kinds(problem.classes, jax.tree.map(lambda leaf: leaf.reshape(-1, 1, 1), problem.rules))
+
+    def about(ij):
+        inside = jnp.all((ij >= 0) & (ij < shape), axis=1)
+        i, j = jnp.clip(ij, 0, shape - 1).T
+        kind = jnp.where(inside, kinds[row, i, j], FORBIDDEN_KIND).astype(jnp.int8)
+        return kind, problem.levels[row, i, j]
+
+    def step(carry, move):
+        ij, wrong, ended = carry
+        going = (move >= 0) & ~ended
+        delta = jnp.asarray(DIRECTIONS)[jnp.clip(move, 0, 7)]
+        sides = [about(ij + delta * jnp.array(axis))[0] for axis in ((1, 0), (0, 1))]
+        ends = about(ij), about(ij + delta)
+        straight = move_kind(*ends, None, problem.rules.corner_cutting)
+        diagonal = move_kind(*ends, sides, problem.rules.corner_cutting)
+        kind = jnp.where(move % 2 == 1, diagonal, straight)
+        wrong = wrong | (going & ((kind == FORBIDDEN_KIND) | (move > 7)))
+        ij = jnp.where(going[:, None], ij + delta, ij)
+        return (ij.astype(problem.start_ij.dtype), wrong, ended | (move < 0)), None
+
+    none = jnp.zeros(count, bool)
+    (_, wrong, _), _ = jax.lax.scan(step, (problem.start_ij, none, none), moves[:, : problem.length].T)
+    own = jnp.zeros(count, jnp.int8) if route.fault is None else route.fault.astype(jnp.int8)
+    return jnp.where(own != FINE, own, jnp.where(wrong, FAILED, FINE)).astype(jnp.int8)

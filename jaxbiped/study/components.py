@@ -1,0 +1,31 @@
+"""What people brought to a study: its strategies that are not built in, and a hash of each one's code and numbers."""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from jaxbiped.core.code_hash import component_hash
+from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.schema import STRATEGIES
+
+C = TypeVar("C", bound=StudyConfig)
+
+
+def hash_of(strategy: Strategy) -> str:
+    """What a strategy dares, and twelve hex digits of its planner's code and numbers."""
+    dares = f"{strategy.bumps:d}{strategy.gates:d}{strategy.blind:d}"
+    return f"{dares}-{component_hash(strategy.planner) if strategy.planner is not None else 'none'}"
+
+
+def fingerprinted(config: C) -> C:
+    """The config with `components` filled in, so that its hash covers the code of what people brought.
+
+    Raises:
+      InputError: a strategy that is not known, or whose module cannot be imported.
+    """
+    own = [name for name in config.strategies if name not in STRATEGIES]
+    made = {}
+    for name in own:
+        made[name] = hash_of(find_strategy(name))
+    return config if made == config.components else config.model_copy(update={"components": made})

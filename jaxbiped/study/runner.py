@@ -1,0 +1,92 @@
+"""The one place that chooses what drives missions: their driver, their sensor and their executor."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from jaxtyping import Array, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.mission.eyes import Eyes, eyes_for
+from jaxbiped.mission.queue import Result
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, program
+from jaxbiped.mission.stepped import Mission, Played, run_logged
+from jaxbiped.mission.strategies import Strategy
+from jaxbiped.study.groups import Group
+
+
+def program_for(config: MissionConfig, arena: Arena) -> Program:
+    """The static part of missions in an arena of this size.
+
+    Raises:
+      InputError: a pitch that does not divide it.
+    """
+    return program(config, tuple(round(float(side), 6) for side in arena.size_xy))
+
+
+def check_mission(config: MissionConfig) -> None:
+    """Refuse, before anything is printed or written, what cannot be run on this machine.
+
+    Raises:
+      InputError: a biped that cannot play its primitives, a device or a renderer that is not there.
+    """
+    if config.executor in SIMULATED:
+        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+
+        rehearse(config)
+
+
+@contextlib.contextmanager
+def seeing(config: MissionConfig) -> Iterator[Eyes | None]:
+    """What missions of a config see with on the host, closed when it is left; None where their sensor is JAX."""
+    eyes = eyes_for(config)
+    try:
+        yield eyes
+    finally:
+        if eyes:
+            eyes.close()
+
+
+def play_one(
+    arena: Arena,
+    config: MissionConfig,
+    strategy: str | Strategy,
+    noise: UInt32[Array, ""],
+    on_decision: Callable[[Played], None] = lambda _: None,
+    eyes: Eyes | None = None,
+) -> Mission:
+    """One mission, with a log of everything, as a study would play it.
+
+    Args:
+      noise: seed of all its noise.
+      eyes: of `seeing`, where the sensor measures on the host.
+
+    Raises:
+      InputError: a pitch that does not divide the arena, a biped that cannot be simulated.
+    """
+    arguments = arena, config.settings(strategy), noise, program_for(config, arena)
+    if config.executor in SIMULATED:
+        from jaxbiped.mission.walking import walk_logged  # loads MuJoCo
+
+        return walk_logged(*arguments, config=config.walk, on_decision=on_decision, eyes=eyes)
+    return run_logged(*arguments, on_decision=on_decision, eyes=eyes)
+
+
+@contextlib.contextmanager
+def batch_driver(group: Group, workers: int) -> Iterator[Callable[..., Result]]:
+    """What plays the missions of a group: a function with the arguments of `evaluate.run_all`."""
+    from jaxbiped.study.evaluate import run_all  # which asks for this
+    from jaxbiped.study.hosted import open_eyes, run_on_host
+
+    with contextlib.ExitStack() as stack:
+        see = partial(open_eyes, group.camera, group.static.localisation) if group.camera else None
+        if group.walk is not None:
+            from jaxbiped.study.walks import walk_all  # loads MuJoCo
+
+            yield partial(walk_all, config=group.walk, eyes=stack.enter_context(see()) if see else None)
+        elif see:
+            yield partial(run_on_host, open_eyes=see, workers=workers)
+        else:
+            yield partial(run_all, workers=workers)
