@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
+from jaxbiped.mission.config import STRATEGIES as STRATEGIES
 from jaxbiped.planning import Rules
 
 
@@ -24,16 +25,6 @@ class Strategy:
     def rules(self) -> Rules:
         """For the planner."""
         return Rules(corner_cutting=self.corner_cutting, bumps=self.bumps, gates=self.gates)
-
-
-# name: (bumps, gates, blind); the bracketed works are those of the paper's Table 1
-STRATEGIES: dict[str, tuple[bool, bool, bool]] = {
-    "full": (True, True, False),  # this study
-    "bump_aware": (True, False, False),  # [7-10]
-    "gate_aware": (False, True, False),  # [11, 12]
-    "floor_only": (False, False, False),  # [6], and the reference of experiment 4
-    "blind_stop": (False, False, True),  # [4, 5]
-}
 
 
 def strategy(name: str, corner_cutting: bool = False) -> Strategy:

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 import pydantic
 import tyro
 
-from jaxbiped.arenas.population import FAMILY_OF, PopulationConfig
+from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
-from jaxbiped.mission.settings import SIMULATED, MissionConfig
-from jaxbiped.study.schema import FAMILIES, KNOWN, MOVING, STRATEGIES
+from jaxbiped.mission.config import SIMULATED, MissionConfig
+from jaxbiped.study.names import FAMILIES, KNOWN, MOVING, STRATEGIES
 
 Family = Literal[KNOWN]
 StrategyName = Literal[STRATEGIES]
