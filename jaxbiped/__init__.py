@@ -1,9 +1,36 @@
-"""Batch evaluation, in JAX, of stereo grid-map motion planning for biped robots.
+"""Batch evaluation, in JAX, of grid-map motion planning for legged robots.
 
-The method is that of Yamashita, Kitaoka and Kaneko, "Motion Planning of Biped Robot Equipped with
-Stereo Camera Using Grid Map" (2011), called "the paper" in every docstring of this package.
-The rooms follow the paper's Fig. 2: arenas, sensing, mapping, planning, motion, mission; then study
-and report. A room uses the rooms before it, never those after it.
+Built in is the method of Yamashita, Kitaoka and Kaneko, "Motion Planning of Biped Robot Equipped with Stereo Camera
+Using Grid Map" (2011), called "the paper" in every docstring of this package. The names below are what sweep scripts
+need; each loads what it stands for when it is first used. The rooms follow the paper's Fig. 2: arenas, sensing,
+mapping, planning, motion, mission; then study and report. A room uses the rooms before it, never those after it.
 """
 
+from jaxbiped.core.lazy_package import lazy_package
+
 __version__ = "0.1.0"
+
+lazy_package(
+    __name__,
+    {
+        "api.study": "RandomArenas Study",
+        "api.run": "PlayedMission evaluate load play register sweep",
+        "api.results": "Results",
+        "api.stored": "compare",
+        "api.plan": "PlannedPath plan",
+        "arenas.arena": "Arena",
+        "arenas.config": "PopulationConfig",
+        "arenas.scene": "BoxConfig:Box SceneConfig:Scene",
+        "errors": "InputError",
+        "mapping.class_grid": "ClassGrid",
+        "mapping.grid": "Cell",
+        "mission.config": "CostConfig LimitConfig MissionConfig",
+        "mission.outcome": "Code",
+        "mission.strategies": "Strategy",
+        "motion.config": "DurationConfig RobotConfig",
+        "planning.costs": "DIRECTIONS Costs Rules",
+        "planning.host_planner": "HostPlanner",
+        "planning.planners": "GridPlanner HeadingPlanner Planner Problem Route",
+        "sensing.config": "CameraConfig LandmarkConfig NoiseConfig OdometryConfig",
+    },
+)

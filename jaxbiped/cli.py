@@ -19,7 +19,8 @@ from jaxbiped.config import Model, input_error, load_toml, parse
 from jaxbiped.errors import InputError
 from jaxbiped.terminal import Sink, Terminated, ended_by_signals, lasting_streams
 
-# command: (module, options, one line, whether a TOML file may come first and give the defaults)
+# command: (module of it and of its options, name of these, one line, whether a TOML file may come first and give the
+# defaults). What a command needs loads once its options are known to be right.
 COMMANDS = {
     "compare": ("compare", "CompareArgs", "compare strategies on random arenas, with statistics", True),
     "sweep": ("sweep", "SweepArgs", "sweep numbers of the config, many points in one program", True),
@@ -112,8 +113,7 @@ def dispatch(name: str, rest: list[str]) -> int:
     module_name, options_name, _, takes_file = COMMANDS[name]
     if name in ON_FOLDERS and rest and Path(rest[0]).is_dir():
         (module_name, options_name), takes_file = ON_FOLDERS[name], False
-    module = importlib.import_module(f"jaxbiped.commands.{module_name}")
-    options: type[Model] = getattr(module, options_name)
+    options: type[Model] = getattr(importlib.import_module(f"jaxbiped.commands.options.{module_name}"), options_name)
     extra = {}
     path = Path(rest.pop(0)) if takes_file and rest and not rest[0].startswith("-") else None
     data = load_toml(path) if path else {}
@@ -134,7 +134,7 @@ def dispatch(name: str, rest: list[str]) -> int:
             raise
         raise one_line(said.getvalue()) from None
     surroundings.check_devices()
-    return module.main(args)
+    return importlib.import_module(f"jaxbiped.commands.{module_name}").main(args)
 
 
 def with_early(data: dict[str, Any], rest: list[str], mission: type[Model]) -> dict[str, Any]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
-
-import numpy as np
 
 
 class InputError(ValueError):
@@ -31,7 +30,8 @@ def _short(value: object, limit: int = 200) -> str:
 
 def _plain(value: object) -> object:
     """Scalars and arrays of NumPy as Python's own, which people read: 0.5 and not np.float64(0.5)."""
-    if isinstance(value, np.generic | np.ndarray):
+    np = sys.modules.get("numpy")  # where it was never loaded, nothing is its own
+    if np is not None and isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if type(value) in (tuple, list):
         return type(value)(_plain(item) for item in value)

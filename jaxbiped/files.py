@@ -16,8 +16,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import yaml
-
 from jaxbiped.errors import InputError
 
 TRIES = 10  # to make a temporary file before anybody takes it for a dead writer's
@@ -163,6 +161,8 @@ def read_text(path: str | Path, *, otherwise: str | None = None) -> str:
 
 def read_yaml(path: str | Path) -> Any:
     """What a YAML file holds; raises `InputError` when it is missing, no text or no YAML."""
+    import yaml
+
     text = read_text(path)
     try:
         return yaml.safe_load(text)

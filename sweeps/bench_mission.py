@@ -41,10 +41,10 @@ from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.queue import SLOTS, stack
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
-from jaxbiped.mission.strategies import STRATEGIES
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import WORKERS, draw, evaluate, run_all
+from jaxbiped.study.names import STRATEGIES
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.reference import mission as reference

@@ -35,10 +35,11 @@ from jaxbiped.mapping import truth_grid
 from jaxbiped.mission.decision import nearest_direction
 from jaxbiped.mission.following import follow
 from jaxbiped.mission.goal import goal_cell
-from jaxbiped.mission.route import quickest
+from jaxbiped.mission.route import pose_problem
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.motion.primitives import DurationConfig
 from jaxbiped.motion.selection import cell_of
+from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
 from jaxbiped.study.config import StrategyName
 from jaxbiped.study.durations import fit
 from jaxbiped.study.evaluate import draw
@@ -62,11 +63,12 @@ def ways(batch, settings, costs, static):
     x, y, yaw = batch.start_xyyaw.T
     start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(x, y, spec)
     heading, length = jax.vmap(nearest_direction)(yaw), 3 * sum(spec.shape)
-    field = quickest(classes, levels, goal_ij, settings, static)
+    problem = pose_problem(classes, levels, goal_ij, start_ij, heading, yaw, settings, static)
+    field = HeadingPlanner().field(problem)
     best = planning.heading_path(field, start_ij, yaw, length)
     walked = [
-        follow(classes, levels, batch.start_xyyaw, goal_ij, settings, replace(static, planner=name))
-        for name in ("heading", "cell")
+        follow(classes, levels, batch.start_xyyaw, goal_ij, replace(settings, planner=planner), static)
+        for planner in (HeadingPlanner(), GridPlanner())
     ]
     times = []
     for each in costs:

@@ -76,7 +76,9 @@ class Results:
     def of(cls, rows: pl.DataFrame, points: pl.DataFrame, config: StudyConfig, own: Sequence[Strategy]) -> Results:
         """Of rows in any order."""
         rank = pl.col("strategy").cast(pl.Enum(ordered(rows["strategy"].unique())))
-        return cls(validate(rows).sort("point", "arena", rank), points, config.model_dump(mode="json"), None, tuple(own))
+        return cls(
+            validate(rows).sort("point", "arena", rank), points, config.model_dump(mode="json"), None, tuple(own)
+        )
 
     @property
     def strategies(self) -> tuple[str, ...]:
@@ -135,9 +137,9 @@ class Results:
     @cached_property
     def pointwise(self):
         """The statistics of every sweep point (`study.pointwise.SweepResult`)."""
-        from jaxbiped.study.pointwise import analyse
+        from jaxbiped.study.pointwise import pointwise
 
-        return analyse(self.rows, self.points, self.config, seed=self.config["seed"])
+        return pointwise(self.rows, self.points, self.config, seed=self.config["seed"])
 
     def plot(self, metric: str = "success") -> Figure:
         """Each strategy's own metric with intervals, over the axis of a sweep or side by side.
@@ -151,7 +153,9 @@ class Results:
         if metric not in METRICS:
             raise InputError(f"must be one of {', '.join(METRICS)}", field="metric", value=metric)
         if len(self.axes) > 1:
-            raise InputError("draws one field; filter `rows` and `points` for the others", field="plot", value=self.axes)
+            raise InputError(
+                "draws one field; filter `rows` and `points` for the others", field="plot", value=self.axes
+            )
         from jaxbiped.report.own_metric import own_metric
 
         return own_metric(self.rows, self.points, metric)

@@ -28,7 +28,7 @@ class RandomArenas:
 
     families: Sequence[str] = FAMILIES
     count: int = 600
-    population: PopulationConfig = PopulationConfig()
+    population: PopulationConfig = field(default_factory=PopulationConfig)
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class Study:
       InputError: a name that is not known, two strategies of one name, a number out of its range.
     """
 
-    arenas: RandomArenas = RandomArenas()
+    arenas: RandomArenas = field(default_factory=RandomArenas)
     strategies: Sequence[str | Strategy | Planner | Any] = BUILT_IN
-    mission: MissionConfig = MissionConfig()
+    mission: MissionConfig = field(default_factory=MissionConfig)
     seed: int = 0
     shard: int = 1024  # arenas that are computed, and stored, together
     own: tuple[Strategy, ...] = field(init=False, repr=False)

@@ -4,40 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
 from jaxtyping import Float
-from pydantic import Field
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.charting import ChartArgs
 from jaxbiped.files import write_whole
 from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.chart import SCAN, Chart, ChartConfig, lay_out, make_chart
+from jaxbiped.mapping.chart import Chart, lay_out, make_chart
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.motion.robot import RobotConfig
-
-Metres = Annotated[float, Field(ge=-1e9, le=1e9)]
-Area = Annotated[tuple[float, float, float, float] | None, tyro.conf.arg(metavar="X0 X1 Y0 Y1")]
-Folder = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
-
-
-class ChartArgs(Model):
-    """Options of both commands."""
-
-    pitch: float = Field(0.05, ge=0.005, le=10.0)
-    """[m] Side of a cell."""
-    area: Area = None
-    """[m] What to map. Default: what the points cover."""
-    robot: RobotConfig = RobotConfig()
-    """The robot that the map is for."""
-    map: ChartConfig = SCAN
-    """Thresholds of the map."""
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
-    """Of the search for the floor."""
-    out: Folder = None
-    """Folder to write, which must not exist. Default: results/<command>-<hash of these options>."""
 
 
 def chart(

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 import time
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
-from pydantic import Field
 
-from jaxbiped.commands.charting import ChartArgs, Metres, chart, say_map, write_chart, write_json
+from jaxbiped.commands.charting import chart, say_map, write_chart, write_json
+from jaxbiped.commands.options.classify import ClassifyArgs
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
@@ -19,24 +17,6 @@ from jaxbiped.mapping.upright import FRAMES, Upright, find_upright, set_upright
 from jaxbiped.sensing import cloud as clouds
 from jaxbiped.sensing.cloud import Cloud
 from jaxbiped.terminal import legible
-
-Vector = Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")]
-
-
-class ClassifyArgs(ChartArgs):
-    """Map a point cloud: 3D grid and class grid, with pictures."""
-
-    cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="CLOUD")]
-    """The cloud, .npz (points [N, 3], or x, y, z), .npy, .ply or .pcd."""
-    scale: Annotated[float, Field(gt=0, le=1e4)] = 1.0
-    """[m] One unit of the cloud; 0.001 for millimetres."""
-    up: Vector = None
-    """The direction against gravity in the cloud's frame. Default: found, z or else y or -y within 30 degrees. Must be
-    given where a larger plane than that floor is tilted by more."""
-    tilt: Annotated[float, Field(ge=0, le=60)] = 10.0
-    """[deg] by which --up may be off; 0 to take it as it is."""
-    floor: Annotated[Metres | None, tyro.conf.arg(metavar="FLOAT")] = None
-    """[m] Height of the floor along --up, which is then taken as it is. Default: found."""
 
 
 def main(args: ClassifyArgs) -> int:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
 
-import pydantic
 from rich.console import Console
 
-from jaxbiped.commands.engine import EngineArgs, engine
+from jaxbiped.commands.engine import engine
+from jaxbiped.commands.options.compare import CompareArgs
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
@@ -22,29 +21,8 @@ from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import group_points, only_point, shards, strategies_of
 from jaxbiped.study.resume import refuse_taken
 from jaxbiped.study.runner import check_mission
-from jaxbiped.study.sequential import MEASURES, Goal
+from jaxbiped.study.sequential import Goal
 from jaxbiped.study.stopping import Rule
-
-
-class CompareArgs(EngineArgs, StudyConfig):
-    """Compare strategies on random arenas: missions, paired statistics, tables and figures.
-
-    A study in TOML may come first; options on the command line override it. A results folder in its place, or two,
-    are compared without running again: see `jaxbiped compare FOLDER --help`.
-    """
-
-    out: Path | None = None
-    """Folder to write, which must not exist. Default: results/compare-<hash of the study>."""
-    resume: bool = False
-    """Go on with the same study in the folder, where it was stopped; or begin it."""
-    until_width: Annotated[float, pydantic.Field(gt=0.0)] | None = None
-    """[fraction, m or s] Stop after the shard that brings the interval of a difference to this width; it holds at every
-    look. `--arenas` is then the most, `--shard` how many between looks."""
-    measure: Literal[MEASURES] = "success"
-    """Whose difference `--until-width` is about."""
-    first: str | None = None
-    """Of that difference: first minus second; by default the pair that the report is about."""
-    second: str | None = None
 
 
 def main(args: CompareArgs) -> int:

@@ -4,22 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any
+from typing import Any
 
-import pydantic
 from rich.console import Console
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.engine import EngineArgs
 from jaxbiped.errors import InputError
-
-
-class EngineArgs(Model):
-    """Options of `engine`."""
-
-    scheduler: str | None = None
-    """Address of a Dask scheduler, such as tcp://host:8786: its workers compute the shards. Needs jaxbiped[cluster]."""
-    workers: Annotated[int, pydantic.Field(ge=1, le=1024)] | None = None
-    """The same by this many worker processes on this machine, among which its cores are shared out."""
 
 
 @contextmanager

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import pydantic
 from rich.console import Console
 from rich.progress import track
 
 from jaxbiped import config
 from jaxbiped.arenas.arena import CIRCLE
-from jaxbiped.config import Model, config_hash
+from jaxbiped.commands.options.fit_sensor import FitSensorArgs
+from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing, write_whole
 from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig
@@ -21,24 +20,6 @@ from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.sensing.noise import NoiseConfig
 from jaxbiped.study.fitting import ALIKE, Fit, choices, fit, sensor_toml
 from jaxbiped.study.sensors import Place, agreement, fused, looking, mission, same, score, with_rays, worlds
-
-
-class FitSensorArgs(Model):
-    """Render arenas, watch the matcher and the landmarks, fit the noise of the ray-cast sensor to what is seen, and
-    say how close the two sensors come on other arenas. The file that is written goes with --preset."""
-
-    camera: Path | None = None
-    """A camera file (TOML); default: the paper's camera."""
-    arenas: Annotated[int, pydantic.Field(ge=1, le=1000)] = 12
-    """Random arenas that are fitted to, all families in turn; as many others are for comparison."""
-    views: Annotated[int, pydantic.Field(ge=1, le=1000)] = 10
-    """Places in each, aimed at gates, bumps and obstacles."""
-    missions: Annotated[int, pydantic.Field(ge=0, le=1000)] = 12
-    """Of both sensors, on the arenas for comparison."""
-    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 1
-    """Of the arenas, the places and all noise."""
-    out: Path | None = None
-    """Sensor file to write, which must not exist. Default: results/fit-sensor-<hash of these options>.toml"""
 
 
 def main(args: FitSensorArgs) -> int:

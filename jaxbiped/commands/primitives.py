@@ -10,20 +10,19 @@ import time
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
 import polars as pl
-import pydantic
 from rich.console import Console
 
-from jaxbiped.config import Model, config_hash, load
+from jaxbiped.commands.options.primitives import PrimitivesArgs
+from jaxbiped.config import config_hash, load
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.motion.biped import RobotModelConfig
-from jaxbiped.motion.catalogue import PAPER, Pace, catalogue
+from jaxbiped.motion.catalogue import catalogue
 from jaxbiped.motion.gait import PrimitiveTable, generate
-from jaxbiped.motion.optimise import Goal, optimise
+from jaxbiped.motion.optimise import optimise
 from jaxbiped.motion.request import Request
 from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.physics.agreement import CROSSING, outcomes, paths
@@ -36,7 +35,6 @@ from jaxbiped.report.video import save_primitive
 from jaxbiped.study import store
 from jaxbiped.terminal import command_line
 
-Name = Literal[tuple(PAPER)]
 MM, DEG = 1e-3, math.radians(1.0)
 LIMITS = {  # disturbances one at a time: unit, and the values tried
     "friction": (1.0, (0.1, 0.2, 0.3, 0.4, 0.6, 1.2)),
@@ -54,42 +52,6 @@ RIM_EDGE = np.arange(0.0, 0.0901, 0.0025)  # [m] from where the robot starts
 APART, HARD_CASES = 1e-3, 64  # [m] that backends may be apart; trials whose outcomes must be the same
 DIFFERENT = 1  # exit status
 WINDOW_EDGE, WINDOW_YAW = np.linspace(-0.035, 0.035, 15), np.linspace(-20, 20, 11)  # [m], [deg]
-
-
-class PrimitivesArgs(Model):
-    """Generate the motion primitives and verify them in simulation: undisturbed, on a mild and a hard set of
-    disturbances, and with each disturbance by itself. Write tables, the library that `--executor sampled` reads, and
-    videos.
-    """
-
-    pace: Pace = "paper"
-    """Table 2's durations, or as fast as servos and balance safely allow (as missions in simulation play them)."""
-    optimise: Goal | None = None
-    """Search phases and pressure points by gradient: `duration`, the shortest primitive within the servos' limits, or
-    `margin`, the widest stability margin at the pace's duration."""
-    only: Annotated[tuple[Name, ...], pydantic.Field(min_length=1)] = tuple(PAPER)
-    """Which primitives."""
-    draws: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 128
-    """Trials of each set."""
-    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Of the disturbances: the first draws of a larger set are the same."""
-    backend: Literal["native", "mjx", "auto"] = "native"
-    """Who steps: MuJoCo on the CPU's threads, or MJX."""
-    device: Literal["cpu", "gpu", "tpu"] | None = None
-    """Where MJX steps; by default where JAX does."""
-    robot: Path | None = None
-    """Robot model, a TOML file such as configs/robots/enuvo_walk_model.toml; its values are the defaults."""
-    bump: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.03
-    """[m] height of the bump that is stepped over."""
-    gate: Annotated[float, pydantic.Field(gt=0.0, le=10.0)] = 0.37
-    """[m] under the lintel of the gate that is passed."""
-    videos: bool = True
-    """Write a video of each primitive, played undisturbed."""
-    against: Literal["mjx"] | None = None
-    """Write nothing, and print how far this backend is from `native`: at every moment of each primitive, and in the
-    outcomes of 64 steps up of which about a third fails. Exit status 1 when it is more than 1 mm or one differs."""
-    out: Path | None = None
-    """Folder to write, which must not exist. Default: results/primitives."""
 
 
 def main(args: PrimitivesArgs) -> int:

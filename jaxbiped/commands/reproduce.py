@@ -6,16 +6,15 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
 
 import jax
 import polars as pl
-import pydantic
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from jaxbiped.arenas import Arena
-from jaxbiped.config import Model, config_hash
+from jaxbiped.commands.options.reproduce import ReproduceArgs
+from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing
 from jaxbiped.mission.settings import SIMULATED, MissionConfig
 from jaxbiped.report.reproduction.files import write
@@ -32,31 +31,6 @@ from jaxbiped.study.reproduction.table_1 import SCENES
 from jaxbiped.study.reproduction.table_2 import NAMES, verify_all
 from jaxbiped.study.runner import seeing
 from jaxbiped.terminal import command_line
-
-
-class ReproduceArgs(Model):
-    """Repeat the paper's experiments and write one page: its Tables 1 to 4 with our figures beside the paper's, the
-    reasons where they differ, pictures after its figures, and the population behind its example.
-    """
-
-    scenes: Path = Path("configs/scenes")
-    """Folder with the scenes of the experiments and of Table 1."""
-    seed: Annotated[int, pydantic.Field(ge=0, lt=2**31)] = 0
-    """Of all noise; repeats take the next ones."""
-    repeats: Annotated[int, pydantic.Field(ge=1, le=1000)] = 5
-    """Missions of each experiment; the one with the median time is shown."""
-    sensor: Literal["stereo", "raycast", "oracle"] = "stereo"
-    """What the missions of the scenes see with."""
-    executor: Literal["native", "mjx", "sampled", "kinematic"] = "native"
-    """How they move."""
-    draws: Annotated[int, pydantic.Field(ge=0, le=100_000)] = 32
-    """Trials of each primitive for Table 2; 0: none."""
-    population: Annotated[int, pydantic.Field(ge=0, le=1_000_000)] = 1000
-    """Random bumps, crossed and gone round, with executor `sampled` and sensor `raycast`; 0: none."""
-    walked: Annotated[int, pydantic.Field(ge=0, le=1_000_000)] = 100
-    """The same with executor `native`; 0: none."""
-    out: Path | None = None
-    """Folder to write, which must not exist. Default: results/reproduce-<hash of these options>."""
 
 
 def main(args: ReproduceArgs) -> int:

@@ -6,42 +6,23 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import Annotated
 
 import jax
-import pydantic
-import tyro
 
 from jaxbiped.arenas import load_scene, scene_warnings
-from jaxbiped.config import Model, config_hash
+from jaxbiped.commands.options.run import RunArgs
+from jaxbiped.config import config_hash
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recording import FILE, save_log
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.report.animation import save_gif
 from jaxbiped.report.pictures import save_mission
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.config import StrategyName
 from jaxbiped.study.runner import check_mission, play_one, program_for, seeing
 
 NOT_REACHED = 1  # exit status
-
-
-class RunArgs(Model):
-    """Run one mission in a scene: print what the robot plays, and write pictures of its map."""
-
-    scene: tyro.conf.Positional[Path]
-    """The scene, a TOML file; the paper's six are in configs/scenes."""
-    strategy: StrategyName = "full"
-    """What the robot dares: full, bump_aware (no gates), gate_aware (no bumps), floor_only, or blind_stop, which walks
-    straight ahead; or package.module:name of your own."""
-    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Of all noise."""
-    out: Path | None = None
-    """Folder to write, which must not exist. Default: results/run-<scene>-<strategy>-<hash of these options>."""
-    mission: Annotated[MissionConfig, tyro.conf.arg(name="")] = MissionConfig()
 
 
 def main(args: RunArgs) -> int:

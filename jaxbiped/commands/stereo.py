@@ -6,22 +6,19 @@ import math
 import sys
 import time
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import tyro
-from pydantic import Field
 
-from jaxbiped.commands.charting import ChartArgs, chart, say_map, write_chart, write_json
+from jaxbiped.commands.charting import chart, say_map, write_chart, write_json
+from jaxbiped.commands.options.stereo import StereoArgs
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
-from jaxbiped.mapping.chart import ONE_LOOK, ChartConfig
 from jaxbiped.mapping.floor import Floor, find_floor
 from jaxbiped.sensing.cloud import save_ply
 from jaxbiped.sensing.stereo.calibration_files import load_rig
 from jaxbiped.sensing.stereo.images import as_rgb, load_pair
-from jaxbiped.sensing.stereo.matching import MatchParams, match
+from jaxbiped.sensing.stereo.matching import match
 from jaxbiped.sensing.stereo.order import check_order
 from jaxbiped.sensing.stereo.points import to_points, useful_range
 from jaxbiped.sensing.stereo.rectify import Rig
@@ -31,25 +28,6 @@ UNKNOWN_CONE = math.radians(65.0)  # of a camera that is held upright, pitched b
 KNOWN_CONE = math.radians(5.0)  # that a pose from the camera file may be off
 DOUBTFUL_SHARE, DOUBTFUL_ROLL = 0.2, math.radians(20.0)  # fewer pixels that match, and more roll, are warned of
 HEIGHT_OFF = 0.15  # of the height of the camera file, or 5 cm, that the floor may be off
-
-
-class StereoArgs(ChartArgs):
-    """Map what a stereo pair shows: points, 3D grid and class grid, with pictures."""
-
-    left: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LEFT")]
-    """The picture of the left camera: PNG, JPEG, TIFF, PGM, ...; grey or colour, 8 or 16 bits."""
-    right: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RIGHT")]
-    """That of the right camera."""
-    camera: Annotated[Path, tyro.conf.arg(metavar="FILE")]
-    """Calibration: .toml, .yaml of OpenCV or of ROS (left.yaml beside right.yaml), .xml, or Middlebury's calib.txt."""
-    max_range: Annotated[float | None, Field(gt=0, le=1000), tyro.conf.arg(metavar="FLOAT")] = None
-    """[m] Drop what is further off. Default: where depth is as uncertain as at 2 m in the paper's camera."""
-    num_disparities: Annotated[int | None, Field(ge=16, le=2048, multiple_of=16), tyro.conf.arg(metavar="INT")] = None
-    """[px] Search range. Default: the camera file's, else --match's."""
-    match: MatchParams = MatchParams()
-    """Numbers of the matcher."""
-    map: ChartConfig = ONE_LOOK
-    """Thresholds of the map."""
 
 
 def main(args: StereoArgs) -> int:

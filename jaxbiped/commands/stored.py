@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
 
 import polars as pl
-import pydantic
-import tyro
 from rich.console import Console
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.stored import StoredArgs
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.report.answer import answer
@@ -24,41 +21,6 @@ from jaxbiped.study.equivalence import equivalences
 from jaxbiped.study.pilot import plan
 from jaxbiped.study.sides import Side, choose, compare_sides, open_stored
 from jaxbiped.terminal import command_line
-
-Share = Annotated[float, pydantic.Field(gt=0.0, lt=1.0)]
-Amount = Annotated[float, pydantic.Field(gt=0.0)]
-
-
-class StoredArgs(Model):
-    """Compare two strategies or sweep points of stored results, on the same arenas, without running again."""
-
-    folders: tyro.conf.Positional[Annotated[tuple[Path, ...], pydantic.Field(min_length=1, max_length=2)]]
-    """One results folder, or two on the same arenas: the first side is then of the first."""
-    first: str | None = None
-    """Strategy of the first side. Differences are first minus second."""
-    second: str | None = None
-    first_point: Annotated[int, pydantic.Field(ge=0)] | None = None
-    """Sweep point of the first side; default 0."""
-    second_point: Annotated[int, pydantic.Field(ge=0)] | None = None
-    """Default: that of the first side."""
-    level: Share = 0.95
-    """Of the intervals."""
-    resamples: Annotated[int, pydantic.Field(ge=10, le=1_000_000)] = 4999
-    """Of the bootstraps."""
-    margin_success: Share | None = None
-    """Test whether success differs by less than this fraction."""
-    margin_distance: Amount | None = None
-    """[m] The same for distance."""
-    margin_time: Amount | None = None
-    """[s] The same for time."""
-    plan_power: bool = False
-    """Say how many arenas would show `--wanted-difference`, taking these results for a pilot."""
-    wanted_difference: Amount | None = None
-    """[fraction, m or s] In `--measure`."""
-    measure: Literal["success", "distance", "time"] = "success"
-    power: Share = 0.8
-    out: Path | None = None
-    """Folder to write the tables and a page into, which must not exist; by default nothing is written."""
 
 
 def main(args: StoredArgs) -> int:

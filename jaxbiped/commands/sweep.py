@@ -7,7 +7,8 @@ from pathlib import Path
 import jax
 from rich.console import Console
 
-from jaxbiped.commands.engine import EngineArgs, engine
+from jaxbiped.commands.engine import engine
+from jaxbiped.commands.options.sweep import SweepArgs
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
@@ -22,18 +23,6 @@ from jaxbiped.study.memory import check_memory
 from jaxbiped.study.resume import refuse_taken
 from jaxbiped.study.runner import check_mission
 from jaxbiped.study.sweep import SweepConfig
-
-
-class SweepArgs(EngineArgs, SweepConfig):
-    """Sweep numbers of the config: missions on the same random arenas at each point, tables and figures.
-
-    The sweep in TOML comes first, such as sweeps/costs.toml; options on the command line override it.
-    """
-
-    out: Path | None = None
-    """Folder to write, which must not exist. Default: results/sweep-<hash of the sweep>."""
-    resume: bool = False
-    """Go on with the same sweep in the folder, where it was stopped; or begin it."""
 
 
 def main(args: SweepArgs) -> int:

@@ -7,12 +7,13 @@ import json
 import time
 from functools import partial
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import BinaryIO
 
 import polars as pl
 from rich.console import Console
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
+from jaxbiped.commands.options.tune import TuneArgs
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
@@ -26,20 +27,6 @@ from jaxbiped.study import store
 from jaxbiped.study.durations import Fit, fit, table_2
 from jaxbiped.study.tune import TuneConfig, Tuning, tune
 from jaxbiped.terminal import command_line
-
-
-class TuneArgs(TuneConfig):
-    """Tune the costs C1 to C4 on random arenas, and judge them on others.
-
-    The planner takes the same paths when all costs double, so that C0 stays as it is. A TOML file may come first and
-    give the defaults.
-    """
-
-    from_durations: Literal["table", "library"] | None = None
-    """Play no mission, and fit C0 to C3 to how long the primitives take: those of `durations` (Table 2 of the paper by
-    default), or those that simulation measured (`library`)."""
-    out: Path | None = None
-    """Folder to write, which must not exist. Default: results/tune-<hash of the config>."""
 
 
 def main(args: TuneArgs) -> int:

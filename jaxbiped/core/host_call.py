@@ -2,8 +2,8 @@
 
 `jax.pure_callback` hands its function arrays that JAX makes while it waits for the program, which can wait for ever
 where all threads of the device are busy. Here XLA calls a C function of ours through its foreign function interface
-(see `planning.compiled.foreign`), which makes NumPy arrays of the memory itself. On other devices `jax.pure_callback` is
-used.
+(see `planning.compiled.foreign`), which makes NumPy arrays of the memory itself. On other devices it is
+`jax.pure_callback`.
 """
 
 from __future__ import annotations

@@ -85,6 +85,9 @@ class Registry(Generic[T]):
         yield from metadata.entry_points(group=self.group)
 
 
+STRATEGIES: Registry = Registry("strategy", "jaxbiped.planners")  # filled by `mission.strategies`
+
+
 def load(place: str, kind: str) -> object:
     """What `package.module:name` stands for; modules are looked for in the working directory, too.
 

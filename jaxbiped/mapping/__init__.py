@@ -1,25 +1,16 @@
 """Points to a classed 2D grid map."""
 
-from jaxbiped.mapping.cobstacles import c_obstacles
-from jaxbiped.mapping.grid import Body, Cell, GridSpec
-from jaxbiped.mapping.gridmap import GridMap, classify, empty, ground_height, mark_footprint, update
-from jaxbiped.mapping.leveling import level_view
-from jaxbiped.mapping.params import MapConfig, MapParams
-from jaxbiped.mapping.truth import truth_grid
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = [
-    "Body",
-    "Cell",
-    "GridMap",
-    "GridSpec",
-    "MapConfig",
-    "MapParams",
-    "c_obstacles",
-    "classify",
-    "empty",
-    "ground_height",
-    "level_view",
-    "mark_footprint",
-    "truth_grid",
-    "update",
-]
+lazy_package(
+    __name__,
+    {
+        "cobstacles": "c_obstacles",
+        "config": "MapConfig",
+        "grid": "Body Cell GridSpec",
+        "gridmap": "GridMap classify empty ground_height mark_footprint update",
+        "leveling": "level_view",
+        "params": "MapParams",
+        "truth": "truth_grid",
+    },
+)

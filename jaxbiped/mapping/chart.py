@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,55 +9,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Float32, Int64
-from pydantic import Field
 
-from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.mapping.config import ONE_LOOK as ONE_LOOK
+from jaxbiped.mapping.config import SCAN as SCAN
+from jaxbiped.mapping.config import ChartConfig as ChartConfig
 from jaxbiped.mapping.cover import Slices, chunks, cover_slices
 from jaxbiped.mapping.grid import MOST_CELLS, Body, Cell, GridSpec
 from jaxbiped.mapping.gridmap import classify, empty, update
-from jaxbiped.mapping.params import MapParams
 from jaxbiped.mapping.roofs import cover_above, find_roofs
 from jaxbiped.sensing.view import View
 
 COVERED = 12.5  # [cm2] of 5 x 5 cm that a scan is taken to cover; sparser ones count for more
-
-
-class ChartConfig(Model):
-    """Thresholds on the surface that points cover, as those of `MapConfig` on numbers of pixels.
-
-    They are stated for cells of 5 x 5 cm, and scale with the cell's area (`solid` belongs to a patch of fixed size).
-    """
-
-    voxel: float = Field(0.25, ge=0)
-    """[cm2] a voxel with less is empty"""
-    voxel_share: float = Field(0.05, ge=0, lt=1)
-    """a voxel with a smaller share of the surface of one right above or below is empty: noise leaked out of that one"""
-    solid: float = Field(6.0, ge=0)
-    """[cm2] a patch of 5 x 5 cm of one level with less bars no way: it may be a phantom; a face of a wall has 15"""
-    cell: float = Field(1.25, gt=0)
-    """[cm2] a cell with less is unmeasured"""
-    head_margin: float = Field(0.0, ge=0)
-    """[m] how far a voxel may reach below the squatting head before it blocks"""
-    height_sd: float = Field(0.0025, ge=0)
-    """[m] to which 1 cm2 tells the height of a surface; n cm2, to a root of n less"""
-
-    def params(self) -> MapParams:
-        """These thresholds for `mapping.update`, to which a point then weighs what it covers."""
-        named = {"voxel_points": self.voxel, "voxel_share": self.voxel_share, "solid_points": self.solid}
-        named |= {"fused_points": self.cell, "head_margin": self.head_margin, "height_sd": self.height_sd}
-        named |= dict.fromkeys(("max_range", "height_range", "fade"), math.inf)
-        unused = ("view_points", "refit_slope", "refit_offset", "refit_inlier", "refit_points", "height_margin")
-        return MapParams(**{name: jnp.float32(value) for name, value in (named | dict.fromkeys(unused, 0.0)).items()})
-
-
-ONE_LOOK, SCAN = ChartConfig(solid=12.5), ChartConfig()
-"""For one stereo pair, whose phantoms must not bar the way, and for a scan, which has none.
-
-By rendered pairs of 36 random arenas, and by clouds sampled from 12 at densities of 4 to 70 points a cell.
-"""
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,12 @@ import dataclasses
 import functools
 import math
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Literal
 
 import numpy as np
-import pydantic
 from jaxtyping import Float64
 
-from jaxbiped.config import Model
+from jaxbiped.mission.config import WalkConfig as WalkConfig
 from jaxbiped.motion import request as ask
 from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.gait import generate
@@ -33,27 +32,6 @@ ANGLE = math.radians(0.5)  # [rad] lattice of turns
 WIDEST_TURN = math.pi / 2  # [rad] in one movement
 FURTHEST_CLIMB = 0.10  # [m] that a step up or down can reach
 TABLES = 4096  # kept
-
-
-class WalkConfig(Model):
-    """How simulated bipeds walk, and where."""
-
-    pace: Literal["fast", "paper"] = "fast"
-    """How fast primitives are simulated; the mission's clock counts Table 2's durations in any case."""
-    slots: Annotated[int, pydantic.Field(ge=1, le=65536)] = 32
-    """Bipeds at once."""
-    device: Literal["cpu", "gpu", "tpu"] | None = None
-    """Where `mjx` runs; None: JAX's default."""
-    threads: Annotated[int, pydantic.Field(ge=0, le=1024)] = 0
-    """Of `native`; 0: one a logical CPU."""
-    impl: Literal["jax", "warp"] = "jax"
-    """Of `mjx`."""
-    biped: RobotModelConfig = RobotModelConfig()
-
-    def options(self, executor: str) -> dict[str, Any]:
-        """For `physics.make`."""
-        own = {"threads": self.threads} if executor == "native" else {"impl": self.impl}
-        return own | {"device": self.device}
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
-from jaxbiped.core.registry import Registry
+from jaxbiped.core.registry import STRATEGIES
 from jaxbiped.errors import InputError
 from jaxbiped.planning import Rules
 from jaxbiped.planning.planners import Planner
@@ -79,7 +79,6 @@ def check_planner(planner: object, name: str) -> None:
 
 
 # The bracketed works are those of the paper's Table 1.
-STRATEGIES = Registry("strategy", "jaxbiped.planners")
 for _strategy in (
     Strategy("full"),  # this study
     Strategy("bump_aware", gates=False),  # [7-10]

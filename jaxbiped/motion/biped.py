@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import jax
-import jax.numpy as jnp
-import numpy as np
 import pydantic
-from jaxtyping import Array, Float
 
 from jaxbiped.config import Model
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from jaxbiped.motion.leg import Biped
 
 Length = Annotated[float, pydantic.Field(gt=0.0, le=2.0)]
 Mass = Annotated[float, pydantic.Field(gt=0.0, le=100.0)]
@@ -164,6 +164,8 @@ class RobotModelConfig(Model):
 
     def limits(self) -> np.ndarray:
         """Joint ranges [12, 2] in radians, in the order of `JOINT_NAMES`."""
+        import numpy as np
+
         left = np.array([getattr(self.ranges, name) for name in JOINTS])
         right = left.copy()
         for j in (0, 1, 5):
@@ -172,6 +174,10 @@ class RobotModelConfig(Model):
 
     def traced(self) -> Biped:
         """What the generator computes with, as arrays."""
+        import jax.numpy as jnp
+
+        from jaxbiped.motion.leg import Biped
+
         body, masses, servo = self.proportions, self.masses, self.servo
         return Biped(
             thigh=jnp.float32(body.thigh),
@@ -188,18 +194,3 @@ class RobotModelConfig(Model):
 def centres_of_mass(body: ProportionsConfig) -> tuple[float, float, float, float]:
     """Height [m] of the centres of mass of torso, thigh, shank and foot above hips, hip, knee and ankle."""
     return 0.45 * body.torso_top, -body.thigh / 2, -body.shank / 2, -body.ankle_height / 2
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Biped:
-    """`RobotModelConfig`, traced: what the generator's formulas need."""
-
-    thigh: Float[Array, ""]  # [m]
-    shank: Float[Array, ""]  # [m]
-    ankle: Float[Array, ""]  # [m] above the sole
-    hip: Float[Array, ""]  # [m] to the side
-    masses: Float[Array, "4"]  # [kg] torso, thigh, shank, foot
-    centres: Float[Array, "4"]  # [m] their centres of mass, above hips, hip, knee and ankle
-    foot: Float[Array, "2"]  # [m] length, width
-    servo: Float[Array, "2"]  # kp [Nm/rad]; kv and damping together [Nm s/rad]

@@ -19,7 +19,8 @@ from jaxtyping import Array, Float
 from scipy.interpolate import CubicSpline
 
 from jaxbiped.errors import InputError
-from jaxbiped.motion.biped import JOINT_NAMES, Biped, RobotModelConfig
+from jaxbiped.motion.biped import JOINT_NAMES, RobotModelConfig
+from jaxbiped.motion.leg import Biped
 from jaxbiped.motion.posture import link_masses, posture
 from jaxbiped.motion.request import Request
 from jaxbiped.motion.score import Score, channels, compose, hip_height, ramp, schedule

@@ -7,8 +7,26 @@ Rx(ankle roll). A bent knee is positive.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Biped:
+    """`RobotModelConfig`, traced: what the generator's formulas need."""
+
+    thigh: Float[Array, ""]  # [m]
+    shank: Float[Array, ""]  # [m]
+    ankle: Float[Array, ""]  # [m] above the sole
+    hip: Float[Array, ""]  # [m] to the side
+    masses: Float[Array, "4"]  # [kg] torso, thigh, shank, foot
+    centres: Float[Array, "4"]  # [m] their centres of mass, above hips, hip, knee and ankle
+    foot: Float[Array, "2"]  # [m] length, width
+    servo: Float[Array, "2"]  # kp [Nm/rad]; kv and damping together [Nm s/rad]
 
 
 def rot_x(a: Float[Array, ""]) -> Float[Array, "3 3"]:

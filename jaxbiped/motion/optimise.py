@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from typing import Literal
 
 import jax
 import jax.numpy as jnp
@@ -17,13 +16,14 @@ import optax
 from jaxtyping import Array, Float
 
 from jaxbiped.errors import InputError
-from jaxbiped.motion.biped import Biped, RobotModelConfig
+from jaxbiped.motion.biped import RobotModelConfig
+from jaxbiped.motion.config import Goal
 from jaxbiped.motion.gait import Motion, PrimitiveTable, pendulum_height, perform, tabulate
+from jaxbiped.motion.leg import Biped
 from jaxbiped.motion.request import Request
 from jaxbiped.motion.score import CHANNELS, PHASES, SHORTEST_REST, Score, compose, schedule
 from jaxbiped.motion.zmp import second_difference
 
-Goal = Literal["duration", "margin"]
 HEADROOM = 0.95  # of each limit that the search keeps to
 SEARCH_KNOTS = 256  # samples while searching: a quarter of the table's, for a quarter of the time
 OFF_UNIT = 0.005  # [m] of the variables that move pressure points, so that Adam's steps suit them

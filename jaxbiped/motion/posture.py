@@ -8,8 +8,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxbiped.motion.biped import GRAVITY, Biped
-from jaxbiped.motion.leg import leg_angles, leg_frames, rot_z
+from jaxbiped.motion.biped import GRAVITY
+from jaxbiped.motion.leg import Biped, leg_angles, leg_frames, rot_z
 
 ROUNDS = 5  # of the fixed point: each leaves less than a tenth of the error
 

@@ -5,17 +5,14 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
-from typing import Annotated
 
 import jax
 import jax.numpy as jnp
-import pydantic
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxbiped.config import Model
-
-CELL = 0.05  # [m] the length that Table 2 gives durations for
-EIGHTH = math.pi / 4  # [rad] the turn that Table 2 gives a duration for
+from jaxbiped.motion.config import CELL as CELL
+from jaxbiped.motion.config import EIGHTH as EIGHTH
+from jaxbiped.motion.config import DurationConfig as DurationConfig
 
 
 class Primitive(enum.IntEnum):
@@ -40,30 +37,6 @@ class Command:
     rise: Int[Array, "*B"]  # levels climbed: -1, 0 or 1
     squat: Bool[Array, "*B"]  # stance in which the primitive is played
     left: Float[Array, "*B"] | float = 0.0  # [m] to the side, after the turn and before the primitive
-
-
-class DurationConfig(Model):
-    """Durations [s]: Table 2 of the paper by default.
-
-    A measurement has no published time; about 10 s explains the mission times of Tables 3 and 4.
-    """
-
-    straight: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 16.0
-    """[s] for 5 cm forward."""
-    turn: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 5.0
-    """[s] for 45 degrees."""
-    step_up: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 96.0
-    """[s] for one step of 3 cm up, 5 cm forward."""
-    step_down: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 96.0
-    """[s] for one step of 3 cm down, 5 cm forward."""
-    pass_gate: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 48.0
-    """[s] for 5 cm forward, squatting; getting down and up is in it."""
-    measure: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 10.0
-    """[s] for one stereo measurement."""
-
-    def traced(self) -> Durations:
-        """The same as arrays."""
-        return Durations(**{name: jnp.float32(value) for name, value in self.model_dump().items()})
 
 
 @jax.tree_util.register_dataclass

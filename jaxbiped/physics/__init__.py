@@ -1,6 +1,11 @@
 """Batches of simulations of any MJCF, in MuJoCo's own batch or in MJX, behind one protocol."""
 
-from jaxbiped.physics.backend import WARNINGS, Backend, Rollout, State, explain
-from jaxbiped.physics.make import BACKENDS, make
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = ["BACKENDS", "WARNINGS", "Backend", "Rollout", "State", "explain", "make"]
+lazy_package(
+    __name__,
+    {
+        "backend": "WARNINGS Backend Rollout State explain",
+        "make": "BACKENDS make",
+    },
+)

@@ -1,8 +1,13 @@
 """Pictures, films, tables, figures and summaries."""
 
-from jaxbiped.report.animation import save_gif
-from jaxbiped.report.pictures import draw_map, save_map, save_mission
-from jaxbiped.report.summary import Report, write_report
-from jaxbiped.report.tables import comparison_table, terminal
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = ["Report", "comparison_table", "draw_map", "save_gif", "save_map", "save_mission", "terminal", "write_report"]
+lazy_package(
+    __name__,
+    {
+        "animation": "save_gif",
+        "pictures": "draw_map save_map save_mission",
+        "summary": "Report write_report",
+        "tables": "comparison_table terminal",
+    },
+)

@@ -44,7 +44,9 @@ def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str) -> Figure:
             value = own_estimate(rows.filter((pl.col("strategy") == name) & (pl.col("point") == point)), metric)
             if value.valid:
                 found.append((float(place + shift), value))
-        error_bars(ax, sorted(found, key=lambda item: item[0]), name, look(name, strategies), measure.scale, bool(fields))
+        error_bars(
+            ax, sorted(found, key=lambda item: item[0]), name, look(name, strategies), measure.scale, bool(fields)
+        )
     if fields:
         scale_x(ax, list(map(float, places)))
         ax.set_xlabel(fields[0])
@@ -52,5 +54,7 @@ def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str) -> Figure:
     else:
         ax.set_xticks(range(len(strategies)), strategies, rotation=20 if len(strategies) > 4 else 0)
         ax.set_xlim(-0.5, len(strategies) - 0.5)
-    ax.set_ylabel("reached the goal [%]" if metric == "success" else f"mean {measure.name} where reached [{measure.unit}]")
+    ax.set_ylabel(
+        "reached the goal [%]" if metric == "success" else f"mean {measure.name} where reached [{measure.unit}]"
+    )
     return figure

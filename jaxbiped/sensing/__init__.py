@@ -3,44 +3,22 @@
 Functions are written for one arena; the mission maps them.
 """
 
-from jaxbiped.sensing.camera import Camera, CameraConfig, ImageSpec
-from jaxbiped.sensing.landmarks import LandmarkConfig, LandmarkNoise
-from jaxbiped.sensing.landmarks import sight as sight_landmarks
-from jaxbiped.sensing.localisation import Belief, correct, known, predict
-from jaxbiped.sensing.motion import VisualConfig, VisualNoise
-from jaxbiped.sensing.noise import NoiseConfig, StereoNoise
-from jaxbiped.sensing.odometry import OdometryConfig, OdometryNoise, drift
-from jaxbiped.sensing.oracle import measure as measure_oracle
-from jaxbiped.sensing.presets import PRESETS, SensorConfig, sensor_preset
-from jaxbiped.sensing.raycast import measure as measure_raycast
-from jaxbiped.sensing.sensor import Sensor
-from jaxbiped.sensing.view import Motion, Sightings, View
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = [
-    "PRESETS",
-    "Belief",
-    "Camera",
-    "CameraConfig",
-    "ImageSpec",
-    "LandmarkConfig",
-    "LandmarkNoise",
-    "Motion",
-    "NoiseConfig",
-    "OdometryConfig",
-    "OdometryNoise",
-    "Sensor",
-    "SensorConfig",
-    "Sightings",
-    "StereoNoise",
-    "View",
-    "VisualConfig",
-    "VisualNoise",
-    "correct",
-    "drift",
-    "known",
-    "measure_oracle",
-    "measure_raycast",
-    "predict",
-    "sensor_preset",
-    "sight_landmarks",
-]
+lazy_package(
+    __name__,
+    {
+        "camera": "Camera ImageSpec",
+        "config": "CameraConfig LandmarkConfig NoiseConfig OdometryConfig VisualConfig",
+        "landmarks": "LandmarkNoise sight:sight_landmarks",
+        "localisation": "Belief correct known predict",
+        "motion": "VisualNoise",
+        "noise": "StereoNoise",
+        "odometry": "OdometryNoise drift",
+        "oracle": "measure:measure_oracle",
+        "presets": "PRESETS SensorConfig sensor_preset",
+        "raycast": "measure:measure_raycast",
+        "sensor": "Sensor",
+        "view": "Motion Sightings View",
+    },
+)

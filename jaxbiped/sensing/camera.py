@@ -6,7 +6,6 @@ their parameter is the depth, and disparity = focal * baseline / depth. (Paper, 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from functools import cached_property
 
@@ -14,13 +13,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
-from pydantic import Field, model_validator
 
-from jaxbiped.config import Model
 from jaxbiped.core import checks
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.geometry.small import matrix, product
+from jaxbiped.sensing.config import CameraConfig as CameraConfig
 
 LEAST = 1e-6  # of what must be above 0 in a camera
 
@@ -102,75 +100,6 @@ class Mount:
     pitch: Float[Array, "*B"]  # [rad]
     height: Float[Array, "*B"]  # [m]
     forward: Float[Array, "*B"]  # [m]
-
-
-class CameraConfig(Model):
-    """A stereo camera. Size and baseline are the paper's (3.1); the rest of it is chosen.
-
-    At 97 degrees and 30 degrees of pitch the lintel of a gate is in view, which a lens of 66 degrees never sees.
-    """
-
-    width: int = Field(512, ge=16, le=8192)
-    """[px] image width."""
-    height: int = Field(384, ge=16, le=8192)
-    """[px] image height."""
-    columns: int = Field(64, ge=4)
-    """Rays across the image (ray-cast sensor); divides the width."""
-    rows: int = Field(48, ge=4)
-    """Rays down the image (ray-cast sensor); divides the height."""
-    baseline: float = Field(0.12, gt=0, le=1)
-    """[m] between the two cameras."""
-    field_of_view: float = Field(97.0, ge=10, le=160)
-    """[deg] across."""
-    pitch: float = Field(30.0, ge=-30, le=90)
-    """[deg] below the horizon."""
-    look_pitch: float = Field(60.0, ge=-30, le=90)
-    """[deg] below the horizon when the robot looks at the place before its feet."""
-    camera_height: float = Field(0.365, gt=0, le=3)
-    """[m] of the optical centre above the supporting surface, standing."""
-    squat_drop: float = Field(0.045, ge=0, le=2)
-    """[m] how much lower it is when squatting; less than its height."""
-    forward: float = Field(0.03, ge=-1, le=1)
-    """[m] of the optical centre ahead of the robot's vertical axis."""
-    num_disparities: int = Field(160, ge=16, le=1024, multiple_of=16)
-    """[px] search range of the matcher; sets the nearest distance that can be measured."""
-    image_noise: float = Field(1.5, ge=0, le=64)
-    """Standard deviation of each channel of each pixel, in grey levels of 256 (rendered sensor)."""
-
-    @model_validator(mode="after")
-    def check_whole(self) -> CameraConfig:
-        for rays, pixels in (("columns", "width"), ("rows", "height")):
-            if getattr(self, pixels) % getattr(self, rays):
-                raise ValueError(
-                    f"{rays} must divide the {pixels} of {getattr(self, pixels)}, got {getattr(self, rays)}"
-                )
-        if self.squat_drop >= self.camera_height:
-            raise ValueError(f"squat_drop must be below the camera_height of {self.camera_height:g} m")
-        return self
-
-    @property
-    def image(self) -> ImageSpec:
-        """The static part."""
-        return ImageSpec(self.width, self.height, self.columns, self.rows)
-
-    @property
-    def focal(self) -> float:
-        """[px]"""
-        return self.width / 2 / math.tan(math.radians(self.field_of_view) / 2)
-
-    def traced(self) -> Camera:
-        """The traced part."""
-        values = {
-            "focal": self.focal,
-            "baseline": self.baseline,
-            "pitch": math.radians(self.pitch),
-            "look_pitch": math.radians(self.look_pitch),
-            "height": self.camera_height,
-            "squat_drop": self.squat_drop,
-            "forward": self.forward,
-            "max_disparity": self.num_disparities - 1,
-        }
-        return Camera(**{name: jnp.asarray(value, jnp.float32) for name, value in values.items()})
 
 
 def check_camera(camera: Camera) -> None:

@@ -7,26 +7,27 @@ condition 2: sizes and places of landmarks are known). The yaw of a square, know
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt32
-from pydantic import Field
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena
-from jaxbiped.config import Model
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.geometry.rays import cast_boxes, nearness
 from jaxbiped.sensing import hashing
 from jaxbiped.sensing.camera import Camera, ImageSpec, check_camera, mount, placed
+from jaxbiped.sensing.config import LandmarkConfig as LandmarkConfig
+from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.sensing.view import Sightings
 
 LANDMARK = 4  # channel of a view's seed
 HIDDEN_MARGIN = 1e-3  # relative: a box that only touches the landmark does not hide it
+RENDERED, IDEAL, REAL = (PRESETS[name].landmarks for name in ("rendered", "ideal", "real"))
 
 
 @jax.tree_util.register_dataclass
@@ -39,35 +40,6 @@ class LandmarkNoise:
     nearest: Float[Array, "*B"]
     furthest_circle: Float[Array, "*B"]
     furthest_square: Float[Array, "*B"]
-
-
-class LandmarkConfig(Model):
-    """How well landmarks are measured. The defaults are those of the preset `rendered`.
-
-    A rendered disc is found within 0.4 mm at 0.35 m and 1.6 mm at 1 m, which
-    calibration, light and print spoil in practice.
-    """
-
-    sd: float = Field(0.002, ge=0, le=1)
-    """[m] standard deviation of x and of y at range 0."""
-    sd_per_metre: float = Field(0.005, ge=0, le=1)
-    """[m/m] its growth with range."""
-    nearest: float = Field(0.2, ge=0, le=100)
-    """[m] from the robot's axis, on the floor; nearer landmarks are not found."""
-    furthest_circle: float = Field(1.2, gt=0, le=100)
-    """[m] circles beyond are not found."""
-    furthest_square: float = Field(0.75, gt=0, le=100)
-    """[m] squares beyond are not found."""
-
-    def traced(self) -> LandmarkNoise:
-        """The same as traced arrays."""
-        values = {field.name: jnp.asarray(getattr(self, field.name), jnp.float32) for field in fields(LandmarkNoise)}
-        return LandmarkNoise(**values)
-
-
-RENDERED = LandmarkConfig()
-IDEAL = LandmarkConfig(sd=0.001, sd_per_metre=0)
-REAL = LandmarkConfig(sd=0.004, sd_per_metre=0.008)
 
 
 @checked(numbers=("camera", "noise"))

@@ -6,20 +6,18 @@ has errors of the size that rendered pictures have.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, UInt32
-from pydantic import Field
 
-from jaxbiped.config import Model
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.sensing import hashing
 from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
+from jaxbiped.sensing.config import VisualConfig as VisualConfig
 from jaxbiped.sensing.view import Motion, View
 
 VISUAL = 6  # channel of a view's seed
@@ -36,33 +34,6 @@ class VisualNoise:
     yaw: Float[Array, "*B"]
     least_share: Float[Array, "*B"]
     failure: Float[Array, "*B"]
-
-
-class VisualConfig(Model):
-    """Visual odometry of the ray-cast sensor. The defaults are what `sweeps/visual_odometry.py` prints of rendered
-    pictures, rounded up, with every preset.
-
-    Standard deviations are those where a tenth of the image's pixels shows what both views measure; they fall with
-    the square root of that share.
-    """
-
-    forward: float = Field(0.0003, ge=0, le=1)
-    """[m] standard deviation along x of the robot before the motion."""
-    left: float = Field(0.0003, ge=0, le=1)
-    """[m] along y."""
-    yaw: float = Field(0.04, ge=0, le=180)
-    """[deg] of the angle turned."""
-    least_share: float = Field(0.02, ge=0, le=1)
-    """Share of the pixels of the image that both views must measure; with less, nothing is found."""
-    failure: float = Field(0.05, ge=0, le=1)
-    """Chance that nothing is found where there is enough."""
-
-    def traced(self) -> VisualNoise:
-        """The same as traced arrays, angles in radians."""
-        values = self.model_dump() | {"yaw": math.radians(self.yaw)}
-        return VisualNoise(
-            **{field.name: jnp.asarray(values[field.name], jnp.float32) for field in fields(VisualNoise)}
-        )
 
 
 SHARE = 0.1  # of the image: where the standard deviations of `VisualConfig` hold

@@ -17,16 +17,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt32
-from pydantic import Field, model_validator
 
-from jaxbiped.config import Model
 from jaxbiped.sensing import hashing
 from jaxbiped.sensing.camera import Camera, ImageSpec
+from jaxbiped.sensing.config import NoiseConfig as NoiseConfig
+from jaxbiped.sensing.presets import PRESETS
 
 MATCH, PHANTOM, ATTITUDE = 1, 2, 3  # channels of a view's seed
 HIDING_REACH = 128  # [px] how far to the right of a pixel something may hide it
 PHANTOM_BLOCK = 12  # [px] size of a clump of phantoms
 LEAST_WIDTH = 1e-2  # [px] in the right image, of one in the left: what turns away further is seen by none
+RENDERED, IDEAL, REAL = (PRESETS[name].stereo for name in ("rendered", "ideal", "real"))
 
 
 @jax.tree_util.register_dataclass
@@ -53,78 +54,6 @@ class StereoNoise:
     attitude_sd: Float[Array, "*B"]
     stretch_kept: Float[Array, "*B"] | None = None  # None, as the next: left out of the program
     stretch_lost: Float[Array, "*B"] | None = None
-
-
-class NoiseConfig(Model):
-    """Noise of stereo matching. The defaults are those of the preset `rendered`."""
-
-    bias: float = Field(0.01, ge=-16, le=16)
-    """[px] added to each disparity."""
-    sd: float = Field(0.14, ge=0, le=16)
-    """[px] standard deviation of disparity on a surface without slope."""
-    slope_gain: float = Field(2.0, ge=0, le=100)
-    """Growth of that: times 1 + slope_gain * slope, with the slope of disparity across the image in px per px."""
-    correlation: float = Field(0.33, ge=0, le=0.5)
-    """Correlation of the noise of two neighbouring rays, across and down (0.33 at 8 px, 0.5 at 4 px)."""
-    quantum: float = Field(1 / 16, ge=0, le=16)
-    """[px] step of disparity; 0 for none."""
-    drop_plain: float = Field(0.03, ge=0, le=1)
-    """Chance that a ray is lost, anywhere."""
-    drop_edge: float = Field(0.20, ge=0, le=1)
-    """Chance that a ray is lost at an edge."""
-    drop_grazing: float = Field(0.45, ge=0, le=1)
-    """Chance that a ray is lost where slope exceeds grazing_slope or grazing_rise, or stretch reaches stretch_lost."""
-    edge_jump: float = Field(2.5, gt=0, le=1000)
-    """[px] second difference of disparity from which a ray counts as one at an edge."""
-    grazing_slope: float = Field(0.8, gt=0, le=100)
-    """[px/px] slope of disparity from which incidence counts as grazing; the floor has 0.3."""
-    grazing_rise: float = Field(0.8, gt=0, le=100)
-    """[px/px] the same, of disparities that rise to the right: such a surface turns away from the right camera."""
-    edge_swap: float = Field(0.065, ge=0, le=1)
-    """Chance that a ray at an edge takes the disparity from across the edge."""
-    phantom_hidden: float = Field(0.02, ge=0, le=1)
-    """Share of what the right camera cannot see that comes out as clumps of one wild disparity each."""
-    phantom_near: float = Field(0.02, ge=0, le=1)
-    """The same for what is nearer than the search range."""
-    min_contrast: float = Field(0.1, ge=0, le=1)
-    """Texture contrast below which nothing is measured."""
-    max_range: float = Field(2.0, gt=0, le=100)
-    """[m] from the camera; points beyond are dropped."""
-    attitude_sd: float = Field(0.3, ge=0, le=20)
-    """[deg] standard deviation of the robot's roll and pitch in a view, which the reprojection does not know."""
-    stretch_kept: float | None = Field(None, ge=0, le=100)
-    """Share by which one image may show a surface wider than the other before rays are lost; by default any."""
-    stretch_lost: float | None = Field(None, gt=0, le=100)
-    """The same share from which on drop_grazing of the rays are lost; between the two, in proportion."""
-
-    @model_validator(mode="after")
-    def check_stretch(self) -> NoiseConfig:
-        kept, lost = self.stretch_kept, self.stretch_lost
-        if (kept is None) != (lost is None) or (kept is not None and not kept < lost):
-            raise ValueError(f"stretch_lost must be above stretch_kept, or both left out, got {lost} and {kept}")
-        return self
-
-    def traced(self) -> StereoNoise:
-        """The same as traced arrays, angles in radians."""
-        values = self.model_dump(exclude_none=True) | {"attitude_sd": np.deg2rad(self.attitude_sd)}
-        return StereoNoise(**{name: jnp.asarray(value, jnp.float32) for name, value in values.items()})
-
-
-RENDERED = NoiseConfig()
-IDEAL = NoiseConfig(
-    bias=0,
-    sd=0,
-    quantum=0,
-    drop_plain=0,
-    drop_edge=0,
-    drop_grazing=0,
-    edge_swap=0,
-    phantom_hidden=0,
-    phantom_near=0,
-    min_contrast=0,
-    attitude_sd=0,
-)
-REAL = NoiseConfig(bias=0.06, sd=0.22, edge_swap=0.11, phantom_hidden=0.4, attitude_sd=0.5)
 
 
 def attitude_error(noise: StereoNoise, seed: UInt32[Array, ""]) -> tuple[Float[Array, ""], Float[Array, ""]]:

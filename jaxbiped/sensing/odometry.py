@@ -9,19 +9,17 @@ worse. In simulation the drift is mostly a steady creep of one sign; here it has
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, UInt32
-from pydantic import Field
 
-from jaxbiped.config import Model
 from jaxbiped.core.checks import finite
 from jaxbiped.core.signatures import checked
 from jaxbiped.sensing import hashing
+from jaxbiped.sensing.config import OdometryConfig as OdometryConfig
 
 ODOMETRY = 5  # channel of a step's seed
 
@@ -35,28 +33,6 @@ class OdometryNoise:
     lateral: Float[Array, "*B"]  # [m / sqrt m]
     yaw_walked: Float[Array, "*B"]  # [rad / sqrt m]
     yaw_turned: Float[Array, "*B"]  # [rad / sqrt rad]
-
-
-class OdometryConfig(Model):
-    """Standard deviations of dead reckoning; each grows with the square root of the distance or angle."""
-
-    forward: float = Field(0.005, ge=0, le=1)
-    """[m] along the way, after 1 m."""
-    lateral: float = Field(0.005, ge=0, le=1)
-    """[m] across the way, after 1 m."""
-    yaw_walked: float = Field(2.7, ge=0, le=180)
-    """[deg] after 1 m."""
-    yaw_turned: float = Field(0.5, ge=0, le=180)
-    """[deg] after turning by 1 rad."""
-
-    def traced(self) -> OdometryNoise:
-        """The same as traced arrays, angles in radians."""
-        return OdometryNoise(
-            forward=jnp.asarray(self.forward, jnp.float32),
-            lateral=jnp.asarray(self.lateral, jnp.float32),
-            yaw_walked=jnp.asarray(math.radians(self.yaw_walked), jnp.float32),
-            yaw_turned=jnp.asarray(math.radians(self.yaw_turned), jnp.float32),
-        )
 
 
 Displacement = tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]

@@ -11,11 +11,8 @@ from pydantic import Field
 
 from jaxbiped import config
 from jaxbiped.config import Model
-from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
-from jaxbiped.sensing import landmarks, noise
-from jaxbiped.sensing.landmarks import LandmarkConfig
-from jaxbiped.sensing.noise import NoiseConfig
+from jaxbiped.sensing.config import LandmarkConfig, NoiseConfig
 
 
 class RayConfig(Model):
@@ -30,24 +27,32 @@ class RayConfig(Model):
 class SensorConfig(Model):
     """A sensor file: noise of the points and of the landmarks, and perhaps how many rays it takes."""
 
-    stereo: NoiseConfig = noise.RENDERED
+    stereo: NoiseConfig = NoiseConfig()
     """Of stereo matching."""
-    landmarks: LandmarkConfig = landmarks.RENDERED
+    landmarks: LandmarkConfig = LandmarkConfig()
     """Of finding landmarks."""
     rays: RayConfig | None = None
     """In place of the camera's own, where this is given and they are not."""
 
 
+SOURCES = "bias sd quantum drop_plain drop_edge drop_grazing edge_swap phantom_hidden phantom_near attitude_sd"
 PRESETS = {
-    "ideal": SensorConfig(stereo=noise.IDEAL, landmarks=landmarks.IDEAL),
-    "rendered": SensorConfig(stereo=noise.RENDERED, landmarks=landmarks.RENDERED),
-    "real": SensorConfig(stereo=noise.REAL, landmarks=landmarks.REAL),
+    "ideal": SensorConfig(
+        stereo=NoiseConfig(**dict.fromkeys(SOURCES.split(), 0), min_contrast=0),
+        landmarks=LandmarkConfig(sd=0.001, sd_per_metre=0),
+    ),
+    "rendered": SensorConfig(),
+    "real": SensorConfig(
+        stereo=NoiseConfig(bias=0.06, sd=0.22, edge_swap=0.11, phantom_hidden=0.4, attitude_sd=0.5),
+        landmarks=LandmarkConfig(sd=0.004, sd_per_metre=0.008),
+    ),
 }
 
 
-@checked()
 def sensor_preset(name: str) -> SensorConfig:
     """The preset of this name, or the sensor file of this path; raises `InputError` when it is neither."""
+    if not isinstance(name, str):
+        raise InputError(f"must be str, not {type(name).__name__}", field="name")
     if name in PRESETS:
         return PRESETS[name]
     if Path(name).suffix != ".toml":

@@ -8,7 +8,6 @@ import numpy as np
 import pydantic
 from jaxtyping import Float
 from pydantic_core import PydanticCustomError
-from scipy.stats import qmc
 
 from jaxbiped.config import Model
 
@@ -116,6 +115,8 @@ class Sobol(Model):
 
     def numbers(self) -> list[dict[str, float]]:
         """The points: field to value."""
+        from scipy.stats import qmc
+
         unit = qmc.Sobol(len(self.names()), rng=np.random.default_rng(self.seed)).random(self.points)
         columns = {}
         for share, name in zip(unit.T, self.names(), strict=True):

@@ -7,20 +7,21 @@ from typing import Annotated, Literal
 import pydantic
 import tyro
 
-from jaxbiped.arenas.population import FAMILY_OF, PopulationConfig
+from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
 from jaxbiped.core.registry import PLACE
-from jaxbiped.mission.settings import SIMULATED, MissionConfig
-from jaxbiped.mission.strategies import STRATEGIES as KNOWN_STRATEGIES
-from jaxbiped.study.schema import FAMILIES, KNOWN, MOVING, STRATEGIES
+from jaxbiped.core.registry import STRATEGIES as REGISTERED
+from jaxbiped.mission.config import SIMULATED, MissionConfig
+from jaxbiped.study.names import FAMILIES, KNOWN, MOVING, STRATEGIES
 
 Family = Literal[KNOWN]
 
 
 def known_strategy(name: str) -> str:
     """A name that is registered, or `package.module:name`, of which nothing is imported here."""
-    if not (KNOWN_STRATEGIES.knows(name) or PLACE.fullmatch(name)):
-        raise ValueError(f"must be one of {', '.join(KNOWN_STRATEGIES)}, or package.module:name of your own planner")
+    if not (name in STRATEGIES or REGISTERED.knows(name) or PLACE.fullmatch(name)):
+        known = ", ".join(dict.fromkeys([*STRATEGIES, *REGISTERED]))
+        raise ValueError(f"must be one of {known}, or package.module:name of your own planner")
     return name
 
 

@@ -7,18 +7,15 @@ from collections.abc import Iterable
 import polars as pl
 
 from jaxbiped.errors import InputError
+from jaxbiped.study.names import CODES as CODES
+from jaxbiped.study.names import FAMILIES as FAMILIES
+from jaxbiped.study.names import KNOWN as KNOWN
+from jaxbiped.study.names import MOVING as MOVING
+from jaxbiped.study.names import REACHED as REACHED
+from jaxbiped.study.names import SCENE as SCENE
+from jaxbiped.study.names import STRATEGIES as STRATEGIES
 
-REACHED = "reached"
-CODES = (
-    *(REACHED, "no_path", "stuck", "collided", "fell", "out_of_bounds", "out_of_steps", "invalid"),
-    *("planner_failed", "planner_timeout"),
-)
-STRATEGIES = ("full", "bump_aware", "gate_aware", "floor_only", "blind_stop")  # that are built in, in their order
 STRATEGY_NAME = r"^[A-Za-z][\w .+-]{0,39}$"
-FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")  # of a study that names none
-MOVING = frozenset({"traffic"})
-KNOWN = (*FAMILIES, *MOVING)
-SCENE = "scene"  # the family of an arena that was written by hand
 KEY = ("point", "arena", "strategy")
 
 SCHEMA = pl.Schema(

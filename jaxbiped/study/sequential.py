@@ -15,13 +15,12 @@ from math import e, log, sqrt
 import numpy as np
 import polars as pl
 from jaxtyping import Float
-from scipy.special import lambertw
 
 from jaxbiped.study.comparison import paired
 from jaxbiped.study.intervals import NOTHING, Estimate
+from jaxbiped.study.names import MEASURES as MEASURES
 
 FIRST_LOOK = 100  # samples: "asymptotic" means nothing before
-MEASURES = ("success", "distance", "time")
 
 
 @dataclass(frozen=True)
@@ -130,4 +129,6 @@ def arenas_for(variance: float, width: float, alpha: float) -> float:
 
 def least(alpha: float) -> float:
     """u of `tightest_at`: at that moment the radius is sqrt(variance u / n), where a fixed one has z^2 for u."""
+    from scipy.special import lambertw
+
     return float(-lambertw(-(alpha**2) / e, -1).real)

@@ -6,20 +6,20 @@ import difflib
 import itertools
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import pydantic
 import tyro
 
-from jaxbiped.arenas.families import SIZE_X, SIZE_Y
-from jaxbiped.arenas.population import FAMILY_OF, PopulationConfig
+from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.config import MissionConfig
 from jaxbiped.study.axes import Axis, Sobol, told
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import Point
-from jaxbiped.study.memory import most_points
+
+if TYPE_CHECKING:
+    from jaxbiped.study.groups import Point
 
 POPULATION, PLANNER = "population", "planner"
 OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # numbers that may be left out
@@ -66,6 +66,8 @@ class SweepConfig(StudyConfig):
           InputError: a field that is unknown, not a number, or swept twice; a value that its field does not allow,
             alone or with the others of its point; more points than memory holds.
         """
+        from jaxbiped.study.memory import most_points
+
         fields = self.fields()
         if self.size() > (most := most_points(len(self.strategies))):
             sizes = [*(len(axis.numbers()) for axis in self.axes), *([self.sobol.points] if self.sobol else [])]
@@ -109,6 +111,10 @@ class SweepConfig(StudyConfig):
 
 def point_at(index: int, values: dict[str, float], mission: dict[str, Any], population: dict[str, Any]) -> Point:
     """One sweep point: the config with some of its fields replaced; InputError about the one that is not allowed."""
+    from jaxbiped.arenas.families import SIZE_X, SIZE_Y
+    from jaxbiped.mission.settings import program
+    from jaxbiped.study.groups import Point
+
     of_planner = {}
     for name, value in values.items():
         if name.startswith(f"{PLANNER}."):

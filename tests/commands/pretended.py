@@ -77,5 +77,6 @@ def draw(folder: Path) -> None:
 
 if __name__ == "__main__":
     cli.COMMANDS["pretend"] = ("pretend", "PretendArgs", "pretend", False)
-    sys.modules["jaxbiped.commands.pretend"] = sys.modules["__main__"]
+    for place in ("commands", "commands.options"):
+        sys.modules[f"jaxbiped.{place}.pretend"] = sys.modules["__main__"]
     sys.exit(cli.main())

@@ -15,10 +15,10 @@ from jaxbiped.mission.queue import Jobs, compile_queue, stack
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import World, start
 from jaxbiped.mission.stepped import turn_once
-from jaxbiped.mission.strategies import STRATEGIES
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
 from jaxbiped.study.evaluate import draw
+from jaxbiped.study.names import STRATEGIES
 
 ARENAS, SETTINGS, JOBS, SLOTS = 32, 16, 32, 8
 CONFIG = MissionConfig()

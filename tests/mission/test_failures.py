@@ -14,7 +14,7 @@ from jaxbiped.mission.cycle import conclude
 from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
-from jaxbiped.mission.state import World, start
+from jaxbiped.mission.state import Planned, World, start
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing.hashing import fold
 from tests.mission.conftest import CONFIG, PROGRAM, play, row
@@ -118,7 +118,19 @@ def test_referee_is_that_of_the_reference(population):
     zero = jnp.zeros(PLACES)
     none = jnp.zeros(PLACES, jnp.int32)
     seed = jnp.asarray(rng.integers(0, 2**32, PLACES, dtype=np.uint32))
-    world = World(Pose(x, y, z, yaw), jnp.asarray(squat), zero, zero, none, none, none - 1, seed, zero, zero)
+    world = World(
+        Pose(x, y, z, yaw),
+        jnp.asarray(squat),
+        zero,
+        zero,
+        none,
+        none,
+        none - 1,
+        seed,
+        zero,
+        zero,
+        Planned(zero, none, zero),
+    )
     ours = jax.device_get(jax.jit(jax.vmap(kinematic, in_axes=(0, 0, 0, None)))(batch, world, command, setting))
     world, command = jax.device_get((world, command))
     differ, seen = 0, {"collided": 0, "fell": 0, "outside": 0}

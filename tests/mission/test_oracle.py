@@ -11,9 +11,10 @@ from jaxbiped.mission.oracle import oracle_plan
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.strategies import STRATEGIES
+from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.planning import Costs, Rules
 from jaxbiped.study.evaluate import draw
+from jaxbiped.study.names import STRATEGIES
 from tests.mission.conftest import CONFIG, PROGRAM, pad, play, row
 from tests.reference import mapping, motion, planning
 
@@ -41,10 +42,10 @@ def test_costs_are_those_of_dijkstra_on_the_true_grid(population, plans):
         arena = population[0][k]
         classes, levels = true_grid(arena)
         start, goal = (motion.cell_of(*at, PROGRAM.spec) for at in (arena.start_xyyaw[:2], arena.goal_xy))
-        for p, (bumps, gates, blind) in enumerate(STRATEGIES.values()):
-            if blind:
+        for p, strategy in enumerate(map(find_strategy, STRATEGIES)):
+            if strategy.blind:
                 continue
-            edges = planning.edge_costs(classes, levels, Costs(), Rules(bumps=bumps, gates=gates))
+            edges = planning.edge_costs(classes, levels, Costs(), Rules(bumps=strategy.bumps, gates=strategy.gates))
             cost = planning.dijkstra(edges, goal, start)[start[0] + 1, start[1] + 1]
             assert plans.cost[p, k] == pytest.approx(cost, rel=1e-5)
 

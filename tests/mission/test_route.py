@@ -14,19 +14,21 @@ from jaxbiped import planning
 from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES
 from jaxbiped.mapping import Cell, truth_grid
+from jaxbiped.mission.decision import nearest_direction
 from jaxbiped.mission.following import follow
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.route import quickest, times_of
+from jaxbiped.mission.route import pose_problem, times_of
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.stepped import run_logged
 from jaxbiped.motion.selection import cell_of
+from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
 from jaxbiped.study.evaluate import draw
 from tests.mission.conftest import CONFIG, PROGRAM
 
 B = 24  # maps
 SCENE = Path(__file__).parents[2] / "configs" / "scenes" / "experiment_5.toml"
-HEADING = replace(PROGRAM, planner="heading")
+PLANNER = HeadingPlanner()
 SECONDS = 0.5  # of a mission: rounding, and turns too small to be played
 
 
@@ -38,8 +40,9 @@ def settings():
 @partial(jax.jit, static_argnames="static")
 def planned_and_taken(classes, levels, start_xyyaw, goal_ij, settings, static):
     """[s] of each plan, and of the robot that follows it."""
-    field = quickest(classes, levels, goal_ij, settings, static)
     start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(start_xyyaw[:, 0], start_xyyaw[:, 1], static.spec)
+    heading, yaw = jax.vmap(nearest_direction)(start_xyyaw[:, 2]), start_xyyaw[:, 2]
+    field = PLANNER.field(pose_problem(classes, levels, goal_ij, start_ij, heading, yaw, settings, static))
     planned = planning.heading_path(field, start_ij, start_xyyaw[:, 2], 1).cost
     return planned, follow(classes, levels, start_xyyaw, goal_ij, settings, static)
 
@@ -47,7 +50,7 @@ def planned_and_taken(classes, levels, start_xyyaw, goal_ij, settings, static):
 def drive(classes, levels, start_xyyaw, goal_ij, settings):
     """The same, from NumPy to NumPy."""
     arguments = (jnp.asarray(a) for a in (classes, levels, np.asarray(start_xyyaw, np.float32), goal_ij))
-    return map(np.asarray, planned_and_taken(*arguments, settings, HEADING))
+    return map(np.asarray, planned_and_taken(*arguments, replace(settings, planner=PLANNER), PROGRAM))
 
 
 def scenes():
@@ -84,7 +87,8 @@ def test_plan_in_random_arenas_takes_about_what_the_clock_counts(settings):
 
 
 def test_switches():
-    assert PROGRAM.planner == "cell" and program(MissionConfig(planner="heading"), (1.8, 1.4)) == HEADING
+    assert CONFIG.settings("full").planner == GridPlanner()
+    assert MissionConfig(planner="heading").settings("full").planner == PLANNER
     for name in ("kinematic", "sampled", "native", "mjx"):
         for placed in (True, False):
             assert program(MissionConfig(executor=name, foot_placement=placed), (1.8, 1.4)).footing == placed

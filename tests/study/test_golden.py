@@ -13,6 +13,6 @@ from tests.study import golden
 def test_rows_are_as_they_were(kind):
     before, rows = pl.read_parquet(golden.FOLDER / f"{kind}.parquet"), golden.play(kind)
     if (golden.FOLDER / f"{kind}.machine").read_text().strip() == golden.machine():
-        changed = [name for name in rows.columns if not rows[name].equals(before[name], null_equal=True)]
+        changed = [name for name in before.columns if not rows[name].equals(before[name], null_equal=True)]
         assert not changed
-    assert_frame_equal(rows, before, check_exact=False, rel_tol=golden.ELSEWHERE)
+    assert_frame_equal(rows.select(before.columns), before, check_exact=False, rel_tol=golden.ELSEWHERE)

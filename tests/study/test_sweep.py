@@ -102,8 +102,10 @@ def test_points_that_differ_in_traced_numbers_share_a_group():
 
 def test_shards_are_numbered_by_the_config_alone():
     config = sweep({"field": "pitch", "values": [0.1, 0.05]}, arenas=10, shard=4)
-    cut = [(shard.number, shard.group, shard.first, shard.count) for shard in shards(config, 2)]
+    cut = [(shard.number, shard.group, shard.first, shard.count) for shard in shards(config, 2, swept=True)]
     assert cut == [(0, 0, 0, 4), (1, 0, 4, 4), (2, 0, 8, 2), (3, 1, 0, 4), (4, 1, 4, 4), (5, 1, 8, 2)]
+    cut = [(shard.number, shard.group, shard.first, shard.count) for shard in shards(config, 2)]
+    assert cut == [(0, 0, 0, 4), (1, 1, 0, 4), (2, 0, 4, 4), (3, 1, 4, 4), (4, 0, 8, 2), (5, 1, 8, 2)]
 
 
 def test_nothing_fixed_leaves_the_population_as_it_is():

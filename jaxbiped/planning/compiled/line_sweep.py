@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from jaxbiped.planning.compiled.names import LANES as LANES
 from jaxbiped.planning.compiled.vector import relaxation
 from jaxbiped.planning.costs import DIRECTIONS
 
-LANES = 16  # arenas a vector: a few of their maps fit the cache of one core
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 LEFT = DJ[:4]  # columns that the first four directions go
 

@@ -12,6 +12,7 @@ from numba import carray, njit
 
 from jaxbiped.planning.compiled import dijkstra, foreign, grids, line_sweep
 from jaxbiped.planning.compiled.line_sweep import LANES
+from jaxbiped.planning.compiled.names import METHODS as METHODS
 
 
 @njit
@@ -60,7 +61,6 @@ def solver(settle, lanes: int):
     return solve
 
 
-METHODS = ("line_sweep", "dijkstra")
 LINE = 64  # [bytes] of the cache
 GRIDS = "grids"  # line sweeps straight from grids
 

@@ -1,17 +1,13 @@
 """Planning over (cell, heading) with the times of the primitives: the time-optimal way, turns included."""
 
-from jaxbiped.planning.heading.crossing import crossing_faces
-from jaxbiped.planning.heading.field import HeadingField, heading_field
-from jaxbiped.planning.heading.path import heading_path, path_time
-from jaxbiped.planning.heading.times import Moves, Times, heading_moves
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = [
-    "HeadingField",
-    "Moves",
-    "Times",
-    "crossing_faces",
-    "heading_field",
-    "heading_moves",
-    "heading_path",
-    "path_time",
-]
+lazy_package(
+    __name__,
+    {
+        "crossing": "crossing_faces",
+        "field": "HeadingField heading_field",
+        "path": "heading_path path_time",
+        "times": "Moves Times heading_moves",
+    },
+)

@@ -1,7 +1,12 @@
 """A real stereo camera: rectified pairs to disparity, and to points."""
 
-from jaxbiped.sensing.stereo.calibration import StereoCamera, ideal
-from jaxbiped.sensing.stereo.matching import Disparity, MatchParams, match
-from jaxbiped.sensing.stereo.points import Points, to_points
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = ["Disparity", "MatchParams", "Points", "StereoCamera", "ideal", "match", "to_points"]
+lazy_package(
+    __name__,
+    {
+        "calibration": "StereoCamera ideal",
+        "matching": "Disparity MatchParams match",
+        "points": "Points to_points",
+    },
+)

@@ -1,19 +1,11 @@
 """The paper's experiments, repeated: what it publishes, what a mission's time went to, and the test scenes."""
 
-from jaxbiped.study.reproduction.account import Measuring, Part, Record, fit_measuring, record, typical
-from jaxbiped.study.reproduction.paper import EXPERIMENTS, PUBLISHED, SAVED, TABLE_1, Experiment, expected
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = [
-    "EXPERIMENTS",
-    "PUBLISHED",
-    "SAVED",
-    "TABLE_1",
-    "Experiment",
-    "Measuring",
-    "Part",
-    "Record",
-    "expected",
-    "fit_measuring",
-    "record",
-    "typical",
-]
+lazy_package(
+    __name__,
+    {
+        "account": "Measuring Part Record fit_measuring record typical",
+        "paper": "EXPERIMENTS PUBLISHED SAVED TABLE_1 Experiment expected",
+    },
+)

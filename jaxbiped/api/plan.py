@@ -1,0 +1,60 @@
+"""One path on one map, without a mission around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from jaxbiped import planning
+from jaxbiped.errors import InputError
+from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.planning.costs import Costs, Rules
+
+
+@dataclass(frozen=True)
+class PlannedPath:
+    """The path of least cost between two cells."""
+
+    cells_ij: Int[np.ndarray, "n 2"]  # from the start to the goal
+    points_xy: Float[np.ndarray, "n 2"]  # [m] their centres
+    cost: float  # by Eq. 1
+
+    @property
+    def length(self) -> float:
+        """[m] between the centres."""
+        return float(np.linalg.norm(np.diff(self.points_xy, axis=0), axis=1).sum())
+
+
+def plan(
+    grid: ClassGrid,
+    start_xy: tuple[float, float],
+    goal_xy: tuple[float, float],
+    costs: Costs | None = None,
+    rules: Rules | None = None,
+) -> PlannedPath | None:
+    """The path of least cost by Eq. 1 on a class grid; None where there is none.
+
+    Args:
+      start_xy, goal_xy: [m] in the grid's frame.
+      costs: on a pitch of 5 cm, the paper's by default; they are brought to the grid's own.
+      rules: what may be done; by default all but cutting corners.
+
+    Raises:
+      InputError: a point outside the map or on an obstacle.
+    """
+    costs, rules = (costs or Costs()).at_pitch(grid.pitch), rules or Rules()
+    cells = [grid.cell_at(xy, name) for name, xy in (("start_xy", start_xy), ("goal_xy", goal_xy))]
+    for name, cell in zip(("start_xy", "goal_xy"), cells, strict=True):
+        if grid.classes[cell] == planning.costs.Cell.OBSTACLE:
+            raise InputError("must not be on an obstacle", field=name, value=list(cell))
+    start, goal = (np.array(cell, np.int32) for cell in cells)
+    edges = planning.edge_costs(grid.classes, grid.levels, costs, rules)
+    to_go = planning.field(grid.classes, grid.levels, costs, rules, goal)
+    path = planning.read_path(to_go, edges, start, int(np.prod(grid.shape)))
+    if not bool(path.valid):
+        return None
+    cells_ij = np.asarray(path.cells_ij)[: int(path.length) + 1]
+    local = (cells_ij[:, ::-1] + 0.5) * grid.pitch
+    return PlannedPath(cells_ij, grid.origin_xy + local @ grid.axes.T, float(path.cost))

@@ -1,0 +1,18 @@
+"""Where the shards of a study are computed: options that commands share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import pydantic
+
+from jaxbiped.config import Model
+
+
+class EngineArgs(Model):
+    """Options of `engine`."""
+
+    scheduler: str | None = None
+    """Address of a Dask scheduler, such as tcp://host:8786: its workers compute the shards. Needs jaxbiped[cluster]."""
+    workers: Annotated[int, pydantic.Field(ge=1, le=1024)] | None = None
+    """The same by this many worker processes on this machine, among which its cores are shared out."""

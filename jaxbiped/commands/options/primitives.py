@@ -1,0 +1,50 @@
+"""Options of `jaxbiped primitives`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import pydantic
+
+from jaxbiped.config import Model
+from jaxbiped.motion.catalogue import PAPER, Pace
+from jaxbiped.motion.config import Goal
+
+Name = Literal[tuple(PAPER)]
+
+
+class PrimitivesArgs(Model):
+    """Generate the motion primitives and verify them in simulation: undisturbed, on a mild and a hard set of
+    disturbances, and with each disturbance by itself. Write tables, the library that `--executor sampled` reads, and
+    videos.
+    """
+
+    pace: Pace = "paper"
+    """Table 2's durations, or as fast as servos and balance safely allow (as missions in simulation play them)."""
+    optimise: Goal | None = None
+    """Search phases and pressure points by gradient: `duration`, the shortest primitive within the servos' limits, or
+    `margin`, the widest stability margin at the pace's duration."""
+    only: Annotated[tuple[Name, ...], pydantic.Field(min_length=1)] = tuple(PAPER)
+    """Which primitives."""
+    draws: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 128
+    """Trials of each set."""
+    seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
+    """Of the disturbances: the first draws of a larger set are the same."""
+    backend: Literal["native", "mjx", "auto"] = "native"
+    """Who steps: MuJoCo on the CPU's threads, or MJX."""
+    device: Literal["cpu", "gpu", "tpu"] | None = None
+    """Where MJX steps; by default where JAX does."""
+    robot: Path | None = None
+    """Robot model, a TOML file such as configs/robots/enuvo_walk_model.toml; its values are the defaults."""
+    bump: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.03
+    """[m] height of the bump that is stepped over."""
+    gate: Annotated[float, pydantic.Field(gt=0.0, le=10.0)] = 0.37
+    """[m] under the lintel of the gate that is passed."""
+    videos: bool = True
+    """Write a video of each primitive, played undisturbed."""
+    against: Literal["mjx"] | None = None
+    """Write nothing, and print how far this backend is from `native`: at every moment of each primitive, and in the
+    outcomes of 64 steps up of which about a third fails. Exit status 1 when it is more than 1 mm or one differs."""
+    out: Path | None = None
+    """Folder to write, which must not exist. Default: results/primitives."""

@@ -1,0 +1,50 @@
+"""Packages whose public names load when they are used (PEP 562): a command that needs none of them starts at once."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any
+
+
+def lazy_package(package: str, public: Mapping[str, str]) -> None:
+    """Give a package its public names and its `__all__`: each is imported at its first use, by any thread.
+
+    Args:
+      package: its `__name__`.
+      public: names by the module, in the package, that they come from; `old:new` for one that is called otherwise.
+    """
+    origins = {}
+    for module, names in public.items():
+        for name in names.split():
+            there, _, here = name.partition(":")
+            origins[here or there] = module, there
+    self = sys.modules[package]
+    self.__dict__["origins_"] = origins
+    self.__dict__["__all__"] = sorted(origins)
+    self.__class__ = LazyPackage
+
+
+class LazyPackage(ModuleType):
+    """See `lazy_package`."""
+
+    def __getattr__(self, name: str) -> Any:
+        origin = self.__dict__["origins_"].get(name)
+        if origin is None:
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
+        module, there = origin
+        value = getattr(importlib.import_module(f"{self.__name__}.{module}"), there)
+        self.__dict__[name] = value
+        return value
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Where a module and a function of it have one name, that is the function: importing sets the module."""
+        module, there = self.__dict__["origins_"].get(name, (None, None))
+        if module == name and isinstance(value, ModuleType):
+            value = getattr(value, there)
+        super().__setattr__(name, value)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*self.__dict__, *self.__dict__["origins_"]} - {"origins_"})

@@ -1,0 +1,186 @@
+"""What may be chosen of a mission: the config for people. `mission.settings` has its traced form, and loads JAX."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import pydantic
+
+from jaxbiped.config import Model
+from jaxbiped.errors import InputError
+from jaxbiped.mapping.config import MapConfig
+from jaxbiped.motion.biped import RobotModelConfig
+from jaxbiped.motion.config import HEIGHT_TOLERANCE, DurationConfig, RobotConfig
+from jaxbiped.sensing.config import CameraConfig, LandmarkConfig, NoiseConfig, OdometryConfig, VisualConfig
+from jaxbiped.sensing.presets import PRESETS, sensor_preset
+
+if TYPE_CHECKING:
+    from jaxbiped.mapping.grid import GridSpec
+    from jaxbiped.mission.settings import Settings
+    from jaxbiped.planning.costs import Costs
+
+# [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
+MAX_RADIUS = 0.15
+SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinematic`: a walking biped sways, and its
+# stereo camera, as wide as the body, sweeps 12 cm to either side
+BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
+SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
+VISUAL = ("visual", "both")  # localisations that measure the motion between two views
+ICP = ("icp", "both")  # those that measure the pose by walls that were measured before
+
+
+# Bounded so that sums of costs along a path keep their differences in single precision.
+Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
+
+
+class CostConfig(Model):
+    """Costs of Eq. (1) on a pitch of 5 cm; the paper's values (3.1). Other pitches: `planning.Costs.at_pitch`."""
+
+    c0: Annotated[float, pydantic.Field(ge=0.1, le=1e3)] = 1.0
+    """Distance, a cell. Never free: a path must come nearer to its goal with each cell."""
+    c1: Cost = 1.0
+    """Floor to floor."""
+    c2: Cost = 5.0
+    """Through a gate, squatting."""
+    c3: Cost = 10.0
+    """Up or down one step."""
+    c4: Cost = 100.0
+    """Into what is unmeasured."""
+
+    def traced(self) -> Costs:
+        """The same as arrays."""
+        import jax.numpy as jnp
+
+        from jaxbiped.planning.costs import Costs
+
+        return Costs(**{name: jnp.float32(value) for name, value in self.model_dump().items()})
+
+
+class LimitConfig(Model):
+    """When a mission ends."""
+
+    goal_radius: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.10
+    """[m] reached when this near to the goal (paper, 3.1)."""
+    max_decisions: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 150
+    """Decisions after which a mission is out of steps."""
+    max_looks: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 4
+    """Measurements in a row that show no path, each a quarter turn on, after which the robot gives up: once around."""
+    edge_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.02
+    """[m] that an edge may lie off under the robot before it falls; simulated bipeds fell from 0.025 on."""
+    height_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = HEIGHT_TOLERANCE
+    """[m] that the ground may be off the height stepped to; simulated bipeds took -12 to +8 mm."""
+    start_sd: tuple[float, float] = (0.002, 0.005)
+    """[m, rad] how well the robot knows where it starts."""
+
+
+class WalkConfig(Model):
+    """How simulated bipeds walk, and where."""
+
+    pace: Literal["fast", "paper"] = "fast"
+    """How fast primitives are simulated; the mission's clock counts Table 2's durations in any case."""
+    slots: Annotated[int, pydantic.Field(ge=1, le=65536)] = 32
+    """Bipeds at once."""
+    device: Literal["cpu", "gpu", "tpu"] | None = None
+    """Where `mjx` runs; None: JAX's default."""
+    threads: Annotated[int, pydantic.Field(ge=0, le=1024)] = 0
+    """Of `native`; 0: one a logical CPU."""
+    impl: Literal["jax", "warp"] = "jax"
+    """Of `mjx`."""
+    biped: RobotModelConfig = RobotModelConfig()
+
+    def options(self, executor: str) -> dict[str, Any]:
+        """For `physics.make`."""
+        own = {"threads": self.threads} if executor == "native" else {"impl": self.impl}
+        return own | {"device": self.device}
+
+
+class MissionConfig(Model):
+    """One kind of mission. Every default is the paper's value, or named where it is chosen."""
+
+    sensor: Literal["raycast", "oracle", "stereo"] = "raycast"
+    """`stereo`: pairs of pictures, rendered and matched on the host."""
+    preset: str = "rendered"
+    """How well the camera measures, the default of each number of `stereo` and `landmarks`: ideal, rendered, real, or a
+    sensor file (.toml), as `jaxbiped fit-sensor` writes it, which says how many rays the camera has, too. What is given
+    beside it wins; the rays need only divide the camera's size as it then is."""
+    executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
+    """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
+    MuJoCo's own batch or in MJX."""
+    localisation: Literal["landmarks", "odometry", "visual", "icp", "both"] = "landmarks"
+    """How the robot knows where it stands: dead reckoning, corrected by landmarks, by nothing (`odometry`), by the
+    motion that two views tell (`visual`), by walls measured before (`icp`), or by the last two. The paper has the
+    first alone; without landmarks there are none in the arena. The sensor `oracle` knows the pose."""
+    pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
+    """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
+    corner_cutting: bool = False
+    """May an oblique move pass one blocked cell?"""
+    planner: Literal["cell", "heading"] = "cell"
+    """`cell`: the least cost by Eq. 1 (the paper's). `heading`: the least time over cells and headings, turns counted;
+    of the costs, C4 alone still counts there."""
+    foot_placement: bool | None = None
+    """Are the feet placed by measured edges? Else edges are crossed from cell to cell, as in the paper. By default for
+    all executors but `kinematic`."""
+    costs: CostConfig = CostConfig()
+    durations: DurationConfig = DurationConfig()
+    robot: RobotConfig = RobotConfig()
+    camera: CameraConfig = CameraConfig()
+    stereo: NoiseConfig = NoiseConfig()
+    landmarks: LandmarkConfig = LandmarkConfig()
+    odometry: OdometryConfig = OdometryConfig()
+    visual: VisualConfig = VisualConfig()
+    mapping: MapConfig = MapConfig()
+    limits: LimitConfig = LimitConfig()
+    walk: WalkConfig = WalkConfig()
+    library: Path | None = None
+    """What `sampled` draws from, a file that `jaxbiped primitives` wrote; by default the one of the default robot."""
+
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _fill_in(cls, data):
+        """What is not given comes from the preset, field by field; the radius depends on who walks, the rule of
+        walls on what it sees with."""
+        if isinstance(data, dict) and data.get("executor", "kinematic") != "kinematic":
+            robot = data.get("robot", {})
+            data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
+        if isinstance(data, dict):
+            limits, robot = data.get("limits", {}), data.get("robot", {})
+            bears = limits.get("height_tolerance") if isinstance(limits, dict) else None
+            bears = getattr(limits, "height_tolerance", bears)  # a config, or something wrong
+            if isinstance(robot, dict) and bears is not None:
+                data = data | {"robot": {"height_tolerance": bears} | robot}
+        if isinstance(data, dict) and data.get("sensor") == "stereo":
+            rules = data.get("mapping", {})
+            data = data | {"mapping": {"below_points": BELOW_POINTS} | rules if isinstance(rules, dict) else rules}
+        try:
+            preset = sensor_preset(data.get("preset", "rendered"))
+        except (InputError, AttributeError, TypeError):
+            return data  # what is wrong is said of the field itself
+        filled = {}
+        for name in ("stereo", "landmarks"):
+            given = data.get(name, {})
+            filled[name] = getattr(preset, name).model_dump() | given if isinstance(given, dict) else given
+        camera = data.get("camera", {})
+        if preset.rays and isinstance(camera, dict):
+            filled["camera"] = preset.rays.model_dump() | camera
+        return data | filled
+
+    @pydantic.field_validator("preset")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        if name not in PRESETS and not name.endswith(".toml"):
+            raise ValueError(f"must be one of {', '.join(PRESETS)} or a .toml file")
+        sensor_preset(name)
+        return name
+
+    def grid(self, size_xy: tuple[float, float]) -> GridSpec:
+        """The static grid of an area [m]; InputError when the pitch does not divide it."""
+        from jaxbiped.mapping.grid import GridSpec
+
+        return GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch, max_radius=MAX_RADIUS)
+
+    def settings(self, strategy: str | Strategy) -> Settings:
+        """The traced part, for one strategy or the one of a name."""
+        from jaxbiped.mission.settings import settings_of
+
+        return settings_of(self, strategy)
