@@ -28,9 +28,10 @@ lazy_package(
         "mission.outcome": "Code",
         "mission.strategies": "Strategy",
         "motion.config": "DurationConfig RobotConfig",
-        "planning.costs": "DIRECTIONS Costs Rules",
+        "planning.costs": "DIRECTIONS Costs Rules edge_costs",
         "planning.host_planner": "HostPlanner",
-        "planning.planners": "GridPlanner HeadingPlanner Planner Problem Route",
+        "planning.planners": "GridPlanner HeadingPlanner Planner Problem Route StraightLine",
+        "planning.ways": "cells_along free_cells",
         "sensing.config": "CameraConfig LandmarkConfig NoiseConfig OdometryConfig",
     },
 )

@@ -5,56 +5,104 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from queue import SimpleQueue
+from typing import Any
 
 SetAsyncExc = ctypes.pythonapi.PyThreadState_SetAsyncExc
 SetAsyncExc.argtypes, SetAsyncExc.restype = (ctypes.c_ulong, ctypes.py_object), ctypes.c_int
+LOOK = 0.01  # [s] between two looks at who is late
+REST = 1.0  # [s] without a call, after which nobody looks
 
 
 class TimeLimit(BaseException):
     """Code took longer than it may. No `Exception`, so that code which catches all of these does not catch it."""
 
 
-LOCK = threading.Condition()
-RUNNING: dict[int, list] = {}  # thread: when it must have ended, and whether it was interrupted
-WATCHERS: list[threading.Thread] = []
+@dataclass
+class Call:
+    """One call under a limit. Whoever takes the token, the watcher or the call that has ended, decides how it ends.
+
+    No lock is shared with the watcher: an interrupt might come while it is held, and then nobody would release it.
+    """
+
+    end: float  # when it is late, on `time.monotonic`
+    token: list = field(default_factory=lambda: [None])
+    sent: bool = False  # whether it was interrupted
 
 
-@contextmanager
-def time_limit(seconds: float) -> Iterator[None]:
-    """Raise `TimeLimit` in this thread when what is inside takes longer; limits do not nest.
+CALLS: dict[int, Call] = {}  # by thread
+WAKE: SimpleQueue = SimpleQueue()
+WATCHER: list[threading.Thread] = []
+RESTING = [False]
+
+
+def within(seconds: float | int, function: Callable, *arguments: Any) -> Any:
+    """`function(*arguments)`; limits do not nest.
 
     Python code is interrupted between two of its instructions, so that a library's compiled code returns first.
+
+    Raises:
+      TimeLimit: it took longer.
     """
-    me, entry = threading.get_ident(), [time.monotonic() + seconds, False]
-    with LOCK:
-        RUNNING[me] = entry
-        if not (WATCHERS and WATCHERS[0].is_alive()):
-            WATCHERS[:] = [threading.Thread(target=watch, daemon=True, name="jaxbiped time limits")]
-            WATCHERS[0].start()
-        elif len(RUNNING) == 1:
-            LOCK.notify()
+    me, call = threading.get_ident(), Call(time.monotonic() + seconds)
+    result, error = None, None
     try:
-        yield
-        late = time.monotonic() > entry[0]
-    finally:
-        with LOCK:
-            RUNNING.pop(me, None)
-            if entry[1]:  # interrupted, perhaps only on its way: nothing may be raised after this
-                SetAsyncExc(me, ctypes.py_object())
-    if late:
+        CALLS[me] = call
+        begin_to_watch()
+        try:
+            result = function(*arguments)
+        except TimeLimit:
+            raise
+        except BaseException as raised:
+            error = raised
+        try:
+            call.token.pop()
+        except IndexError:  # it is late, and the interrupt on its way, or swallowed by what was called
+            while not call.sent:
+                time.sleep(0.0001)
+            for _ in range(3):
+                time.sleep(0)
+            raise TimeLimit from None
+    except TimeLimit:
+        CALLS.pop(me, None)
+        raise
+    CALLS.pop(me, None)
+    if error is not None:
+        raise error
+    if time.monotonic() > call.end:
         raise TimeLimit
+    return result
+
+
+def begin_to_watch() -> None:
+    """See that a watcher is awake."""
+    if not (WATCHER and WATCHER[0].is_alive()):
+        WATCHER[:] = [threading.Thread(target=watch, daemon=True, name="jaxbiped time limits")]
+        WATCHER[0].start()
+    if RESTING[0]:
+        WAKE.put(None)
 
 
 def watch() -> None:
     """Interrupt what takes too long."""
-    with LOCK:
-        while True:
-            now = time.monotonic()
-            for thread, entry in RUNNING.items():
-                if now > entry[0] and not entry[1]:
-                    entry[1] = True
-                    SetAsyncExc(thread, TimeLimit)
-            waiting = [entry[0] - now for entry in RUNNING.values() if not entry[1]]
-            LOCK.wait(max(0.001, min(waiting)) if waiting else None)
+    RESTING[0], seen = False, time.monotonic()
+    while True:
+        now = time.monotonic()
+        for thread, call in list(CALLS.items()):
+            seen = now
+            if now > call.end and not call.sent:
+                try:
+                    call.token.pop()
+                except IndexError:  # it has just ended
+                    continue
+                SetAsyncExc(thread, TimeLimit)
+                call.sent = True
+        if now - seen < REST:
+            time.sleep(LOOK)
+            continue
+        RESTING[0] = True
+        if not CALLS:
+            WAKE.get()
+        RESTING[0], seen = False, time.monotonic()

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.core.host_call import host_call
-from jaxbiped.core.time_limit import TimeLimit, time_limit
+from jaxbiped.core.time_limit import TimeLimit, within
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import DIRECTIONS, Costs
@@ -141,8 +141,7 @@ def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs
     """The fault of one call, and what it returned."""
     start, goal = (tuple(int(v) for v in cell) for cell in (start, goal))
     try:
-        with time_limit(limit):
-            return FINE, function(classes, levels, start, goal, costs)
+        return FINE, within(limit, function, classes, levels, start, goal, costs)
     except TimeLimit:
         return TOO_SLOW, None
     except Exception as error:

@@ -231,3 +231,36 @@ def faults(problem: Problem, route: Route, planner: Planner) -> Int8[Array, "B"]
     (_, wrong, _), _ = jax.lax.scan(step, (problem.start_ij, none, none), moves[:, : problem.length].T)
     own = jnp.zeros(count, jnp.int8) if route.fault is None else route.fault.astype(jnp.int8)
     return jnp.where(own != FINE, own, jnp.where(wrong, FAILED, FINE)).astype(jnp.int8)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class StraightLine(Planner):
+    """Straight to the goal, cell by cell in the direction that leads there best, and nowhere where that is forbidden.
+
+    What a robot without a planner does; the strategy `blind_stop` does so without a map.
+    """
+
+    def plan(self, problem: Problem) -> Route:
+        """See `Planner`."""
+        shape, moves = jnp.array(problem.shape), jnp.asarray(DIRECTIONS)
+        kinds = cell_kinds(problem.classes, problem.rules)
+        ij, ended, directions = problem.start_ij, jnp.zeros((), bool), []
+
+        def about(cell):
+            inside = jnp.all((cell >= 0) & (cell < shape))
+            i, j = jnp.clip(cell, 0, shape - 1)
+            return jnp.where(inside, kinds[i, j], FORBIDDEN_KIND).astype(jnp.int8), problem.levels[i, j]
+
+        for _ in range(problem.length):
+            away = (problem.goal_ij - ij).astype(jnp.float32)
+            # The move that brings it nearest to the goal; of two, the first.
+            k = jnp.argmin(jnp.hypot(*(away[:, None] - moves.T)))
+            sides = [about(ij + moves[k] * jnp.array(axis))[0] for axis in ((1, 0), (0, 1))]
+            ends = about(ij), about(ij + moves[k])
+            cutting = problem.rules.corner_cutting
+            kind = jnp.where(k % 2 == 1, move_kind(*ends, sides, cutting), move_kind(*ends, None, cutting))
+            ended = ended | (kind == FORBIDDEN_KIND) | jnp.all(away == 0)
+            directions.append(jnp.where(ended, -1, k).astype(jnp.int8))
+            ij = jnp.where(ended, ij, ij + moves[k])
+        return Route(jnp.stack(directions))

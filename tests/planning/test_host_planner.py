@@ -1,0 +1,96 @@
+"""Ways that functions of people return: read and priced as Eq. 1 says, or refused with what is wrong with them."""
+
+import numpy as np
+import pytest
+
+from jaxbiped.errors import InputError
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning import DIRECTIONS, Costs, Rules
+from jaxbiped.planning.host_planner import HostPlanner, dared, read_way
+from tests.reference import planning as reference
+
+COSTS = Costs()
+FLAT = np.zeros((3, 4), np.int8)
+OPEN = np.full((3, 4), Cell.FLOOR, np.int8)
+WALL = OPEN.copy()
+WALL[1, 1] = Cell.OBSTACLE
+STEEP = FLAT.copy()
+STEEP[:, 2] = 2
+
+
+@pytest.mark.parametrize(
+    "way, grid, levels, match",
+    [
+        ([], OPEN, FLAT, "must return cells"),
+        (5, OPEN, FLAT, "must return cells"),
+        ([[0, 0, 0], [1, 0, 0]], OPEN, FLAT, "must return cells"),
+        ("up", OPEN, FLAT, "must return cells"),
+        ([[0.5, 0], [0, 3]], OPEN, FLAT, "whole rows and columns"),
+        ([[np.nan, 0], [0, 3]], OPEN, FLAT, "whole rows and columns"),
+        ([[0, 1], [0, 2], [0, 3]], OPEN, FLAT, r"goes from \[0, 1\] to \[0, 3\], not from \[0, 0\]"),
+        ([[0, 0], [0, 1], [0, 2]], OPEN, FLAT, "goes from"),
+        ([[0, 0], [-1, 1], [-1, 2], [0, 3]], OPEN, FLAT, "leaves the map"),
+        ([[0, 0], [0, 1], [0, 4], [0, 3]], OPEN, FLAT, "leaves the map"),
+        ([[0, 0], [0, 2], [0, 3]], OPEN, FLAT, "no neighbours"),
+        ([[0, 0], [0, 0], [0, 1], [0, 2], [0, 3]], OPEN, FLAT, "no neighbours"),
+        ([[0, 0], [1, 1], [0, 2], [0, 3]], WALL, FLAT, r"obstacle at \[1, 1\]"),
+        ([[0, 0], [0, 1], [1, 2], [0, 3]], WALL, FLAT, "cuts the corner"),
+        ([[0, 0], [0, 1], [0, 2], [0, 3]], OPEN, STEEP, "up or down 2 levels"),
+    ],
+)
+def test_ways_that_are_wrong_are_refused_by_what_is_wrong(way, grid, levels, match):
+    with pytest.raises(ValueError, match=match):
+        read_way(way, grid, levels, (0, 0), (0, 3), COSTS, False)
+
+
+def test_corners_may_be_cut_where_the_rules_allow_it():
+    moves, cost = read_way([[0, 0], [0, 1], [1, 2], [0, 3]], WALL, FLAT, (0, 0), (0, 3), COSTS, True)
+    assert moves.tolist() == [0, 1, 7] and cost == pytest.approx(2 + 2 * (np.sqrt(2) + 1))
+
+
+def test_random_walks_cost_what_the_plain_edges_cost_and_are_refused_where_these_are_forbidden():
+    """Thousands of walks of one to four moves on maps of all classes and levels, with and without cut corners."""
+    rng, refused, read = np.random.default_rng(0), 0, 0
+    for _ in range(300):
+        shape = tuple(rng.integers(1, 7, 2))
+        classes, levels = rng.integers(0, 5, shape).astype(np.int8), rng.integers(-1, 3, shape).astype(np.int8)
+        rules = Rules(*(bool(v) for v in rng.integers(0, 2, 3)))
+        costs = Costs(*rng.uniform(0.1, 20, 5).tolist())
+        edges = reference.edge_costs(classes, levels, costs, rules)
+        grid = dared(classes, rules.bumps, rules.gates)
+        for _ in range(20):
+            moves = rng.integers(0, 8, rng.integers(1, 5))
+            cells = np.vstack([[rng.integers(0, n) for n in shape], DIRECTIONS[moves]]).cumsum(0)
+            inside = ((cells >= 0) & (cells < shape)).all()
+            price = (
+                sum(edges[k, i + 1, j + 1] for k, (i, j) in zip(moves, cells[:-1], strict=True)) if inside else np.inf
+            )
+            try:
+                given = read_way(cells, grid, levels, cells[0], cells[-1], costs, rules.corner_cutting)
+            except ValueError:
+                refused += 1
+                assert price == np.inf
+            else:
+                read += 1
+                np.testing.assert_array_equal(given[0], moves)
+                assert given[1] == pytest.approx(price, rel=1e-12)
+    assert refused > 2000 and read > 200
+
+
+def test_no_way_to_go_is_a_way():
+    moves, cost = read_way([[1, 0]], WALL, FLAT, (1, 0), (1, 0), COSTS, False)
+    assert len(moves) == 0 and cost == 0
+
+
+def test_what_is_not_dared_is_an_obstacle():
+    grid = np.array([[Cell.FLOOR, Cell.BUMP, Cell.GATE, Cell.UNMEASURED]], np.int8)
+    assert (dared(grid, True, True) == grid).all()
+    assert dared(grid, False, True).tolist() == [[Cell.FLOOR, Cell.OBSTACLE, Cell.GATE, Cell.UNMEASURED]]
+    assert dared(grid, True, False).tolist() == [[Cell.FLOOR, Cell.BUMP, Cell.OBSTACLE, Cell.UNMEASURED]]
+    assert grid.tolist() == [[Cell.FLOOR, Cell.BUMP, Cell.GATE, Cell.UNMEASURED]]
+
+
+@pytest.mark.parametrize("function, limit", [(None, 1.0), (5, 1.0), (len, 0.0), (len, -1.0), (len, float("nan"))])
+def test_what_is_no_function_and_no_limit_is_refused(function, limit):
+    with pytest.raises(InputError, match="HostPlanner"):
+        HostPlanner(function, limit)
