@@ -13,14 +13,15 @@ __version__ = "0.1.0"
 lazy_package(
     __name__,
     {
-        "api.study": "RandomArenas Study",
+        "api.study": "RandomArenas Scenes Study",
         "api.run": "PlayedMission evaluate load play register sweep",
         "api.results": "Results",
         "api.stored": "compare",
         "api.plan": "PlannedPath plan",
         "arenas.arena": "Arena",
         "arenas.config": "PopulationConfig",
-        "arenas.scene": "BoxConfig:Box SceneConfig:Scene",
+        "arenas.scene": "BoxConfig:Box SceneConfig:Scene to_arena",
+        "arenas.source": "Family",
         "errors": "InputError",
         "mapping.class_grid": "ClassGrid",
         "mapping.grid": "Cell",

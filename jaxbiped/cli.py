@@ -37,6 +37,7 @@ COMMANDS = {
 }
 # What a command is when its first argument is a results folder: another module, other options.
 ON_FOLDERS = {"compare": ("stored", "StoredArgs")}
+ON_SCENES = ("compare",)  # commands whose first arguments may be scenes, or a folder of them
 # Options of a mission on which the defaults of other options depend.
 EARLY = ("preset", "executor", "sensor", *(f"camera.{name}" for name in ("width", "height", "columns", "rows")))
 WRONG_INPUT = 2  # exit status
@@ -111,6 +112,8 @@ def dispatch(name: str, rest: list[str]) -> int:
     import tyro
 
     module_name, options_name, _, takes_file = COMMANDS[name]
+    if name in ON_SCENES:
+        rest = with_scenes(rest)
     if name in ON_FOLDERS and rest and Path(rest[0]).is_dir():
         (module_name, options_name), takes_file = ON_FOLDERS[name], False
     options: type[Model] = getattr(importlib.import_module(f"jaxbiped.commands.options.{module_name}"), options_name)
@@ -135,6 +138,23 @@ def dispatch(name: str, rest: list[str]) -> int:
         raise one_line(said.getvalue()) from None
     surroundings.check_devices()
     return importlib.import_module(f"jaxbiped.commands.{module_name}").main(args)
+
+
+def with_scenes(rest: list[str]) -> list[str]:
+    """Options in which scene files, or a folder of them, that come first are the families, with an arena each."""
+    first = list(itertools.takewhile(lambda word: not word.startswith("-"), rest))
+    files = [Path(word) for word in first]
+    if len(files) == 1 and files[0].is_dir() and not (files[0] / "manifest.json").exists():
+        files = sorted(files[0].glob("*.toml")) or files
+    is_scene = [path.suffix == ".toml" and path.is_file() and "start" in load_toml(path) for path in files]
+    if not files or not (all(is_scene) or (len(files) > 1 and any(is_scene))):
+        return rest
+    for path, fits in zip(files, is_scene, strict=True):
+        if not fits:
+            raise InputError("is no scene, as the others are: it must be a TOML file with start and goal", file=path)
+    options = rest[len(first) :]
+    count = [] if any(word.split("=")[0] == "--arenas" for word in options) else ["--arenas", str(len(files))]
+    return ["--families", *map(str, files), *count, *options]
 
 
 def with_early(data: dict[str, Any], rest: list[str], mission: type[Model]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from jaxbiped.mission.strategies import Strategy
 from jaxbiped.study import store
 from jaxbiped.study.comparison import Comparison, compare, default_pairs
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import group_points, only_point, shards, strategies_of
+from jaxbiped.study.groups import groups_of, only_point, shards
 from jaxbiped.study.schema import ordered, validate
 from jaxbiped.study.sweep import SweepConfig
 
@@ -168,7 +168,7 @@ class Results:
         """
         config = (SweepConfig if "axes" in self.config else StudyConfig).model_validate(self.config)
         points = tuple(config.points()) if self.axes else only_point(config)
-        groups = group_points(points, strategies_of(config))
+        groups = groups_of(config, points)
         swept = self.points if self.axes else None
         with store.create(folder, config, seed=config.seed, arenas=config.arenas, points=swept) as results:
             for shard in shards(config, len(groups), swept=bool(self.axes)):

@@ -10,7 +10,9 @@ from typing import Any
 import pydantic
 
 from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.source import Family, as_family
 from jaxbiped.config import input_error
+from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import STRATEGIES, Strategy, as_strategy
@@ -24,11 +26,35 @@ from jaxbiped.study.sweep import SweepConfig
 
 @dataclass(frozen=True)
 class RandomArenas:
-    """Arenas drawn from families; arena k of a seed is always the same one."""
+    """Arenas drawn from families that take turns; arena k of a seed is always the same one.
 
-    families: Sequence[str] = FAMILIES
+    Args:
+      families: names of families, scene files (.toml), generators of your own (functions of a random key that return
+        an `Arena`, in JAX), or `Family` objects.
+      count: of arenas.
+      population: what is fixed of families that are built in.
+    """
+
+    families: Sequence[str | Path | Family | Any] = FAMILIES
     count: int = 600
     population: PopulationConfig = field(default_factory=PopulationConfig)
+
+
+def Scenes(files: str | Path | Sequence[str | Path], count: int | None = None) -> RandomArenas:
+    """Scenes that take turns.
+
+    Args:
+      files: a folder, or scene files.
+      count: of arenas; more than there are scenes: each again, with other noise. By default one each.
+
+    Raises:
+      InputError: a folder without scenes.
+    """
+    if isinstance(files, str | Path):
+        files = sorted(Path(files).glob("*.toml")) if Path(files).is_dir() else [files]
+    if not files:
+        raise InputError("holds no scenes (.toml)", field="scenes")
+    return RandomArenas(tuple(str(file) for file in files), count or len(files))
 
 
 @dataclass(frozen=True)
@@ -70,7 +96,7 @@ class Study:
         data = {
             "seed": self.seed,
             "arenas": self.arenas.count,
-            "families": tuple(self.arenas.families),
+            "families": tuple(registered(item) for item in self.arenas.families),
             "strategies": tuple(item if isinstance(item, str) else named(item).name for item in self.strategies),
             "population": self.arenas.population.model_dump(),
             "mission": self.mission.model_dump(),
@@ -92,6 +118,15 @@ class Study:
         config = load(StudyConfig, path)
         arenas = RandomArenas(config.families, config.arenas, config.population)
         return cls(arenas, config.strategies, config.mission, config.seed, config.shard)
+
+
+def registered(family: Any) -> str:
+    """The name of a family in the registry."""
+    if isinstance(family, str | Path):
+        return str(family)
+    made = family if isinstance(family, Family) else as_family(family, getattr(family, "__name__", str(family)))
+    FAMILIES_OWN.add(made.name, made, replace=True)
+    return made.name
 
 
 def named(thing: Any) -> Strategy:

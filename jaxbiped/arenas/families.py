@@ -49,6 +49,7 @@ def sample(
     index: Int[Array, ""] | int,
     families: tuple[str, ...] = FAMILIES,
     population: Population | None = None,
+    turn: Int[Array, ""] | None = None,
 ) -> Arena:
     """Arena `index` of the population that `key` names.
 
@@ -58,6 +59,7 @@ def sample(
     Args:
       families: static; which families take turns.
       population: what is fixed and not drawn; all else of the arena stays as it is.
+      turn: which of the families it is; by default `index` modulo their number.
 
     Raises:
       InputError: a key that is none, an index below 0, no family, or one that is not known.
@@ -66,7 +68,7 @@ def sample(
     unknown = [name for name in families if name not in LAYOUTS]
     if unknown or not families:
         raise InputError(f"must be of {', '.join(KNOWN)}", field="families", value=unknown[0] if unknown else ())
-    turn = jnp.asarray(index) % len(families)
+    turn = jnp.asarray(index) % len(families) if turn is None else turn
     # One draw feeds every part: each call of the generator costs compile time.
     u = jax.random.uniform(jax.random.fold_in(key, index), (DRAWS, MAX_BOXES))
     difficulty = u[0, 0]

@@ -18,7 +18,7 @@ from jaxbiped.study.comparison import default_pairs
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.conduct import conduct, never
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import group_points, only_point, shards, strategies_of
+from jaxbiped.study.groups import groups_of, shards, strategies_of
 from jaxbiped.study.resume import refuse_taken
 from jaxbiped.study.runner import check_mission
 from jaxbiped.study.sequential import Goal
@@ -36,7 +36,7 @@ def main(args: CompareArgs) -> int:
     """
     config = StudyConfig.model_validate(args.model_dump(include=set(StudyConfig.model_fields)))
     config = fingerprinted(config)
-    groups = group_points(only_point(config), strategies_of(config))  # refuses what does not fit before all else
+    groups = groups_of(config)  # refuses what does not fit before all else
     strategies = tuple(item.name for item in strategies_of(config))
     goal = goal_of(args, strategies)
     check_mission(config.mission)

@@ -18,7 +18,7 @@ from jaxbiped.report.sweep_page import write_sweep_page
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.evaluate import WORKERS
-from jaxbiped.study.groups import group_points, shards, strategies_of
+from jaxbiped.study.groups import groups_of, shards, strategies_of
 from jaxbiped.study.memory import check_memory
 from jaxbiped.study.resume import refuse_taken
 from jaxbiped.study.runner import check_mission
@@ -42,7 +42,7 @@ def main(args: SweepArgs) -> int:
     points = tuple(config.points())
     config = fingerprinted(config)
     strategies = strategies_of(config)
-    groups = group_points(points, strategies)
+    groups = groups_of(config, points)
     for group in groups:
         arenas = min(config.shard, config.arenas)
         queues = max(WORKERS, jax.local_device_count())

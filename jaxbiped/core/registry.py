@@ -86,6 +86,7 @@ class Registry(Generic[T]):
 
 
 STRATEGIES: Registry = Registry("strategy", "jaxbiped.planners")  # filled by `mission.strategies`
+FAMILIES: Registry = Registry("family", "jaxbiped.arenas")  # of arenas that are not built in
 
 
 def load(place: str, kind: str) -> object:

@@ -14,8 +14,7 @@ from jaxbiped.report.figures import CODE_COLOURS, canvas, difficulty, forest_row
 from jaxbiped.report.svg import INK, LINE, inline, themed
 from jaxbiped.report.tables import Sheet
 from jaxbiped.report.words import OPEN
-from jaxbiped.study import ALL, CODES, KNOWN, Comparison
-from jaxbiped.study.schema import SCENE
+from jaxbiped.study import ALL, CODES, Comparison
 
 WIDTH = 5.2  # [inch]
 NO_PLAN = "#BFC6CE"
@@ -143,7 +142,7 @@ def attributed(frame: pl.DataFrame, names: Sequence[str]) -> dict[str, np.ndarra
 
 def attribution_sheet(frame: pl.DataFrame, first: str, second: str) -> Sheet:
     """The same for two strategies, family by family."""
-    parts = [(family, frame.filter(pl.col("family") == family)) for family in (*KNOWN, SCENE)]
+    parts = [(family, frame.filter(pl.col("family") == family)) for family in ordered_families(frame["family"])]
     counts = {family: attributed(rows, (first, second)) for family, rows in parts if len(rows)}
     seen = [label for label in ("reached", UNPLANNED, *CODES[1:]) if any(item[label].any() for item in counts.values())]
     groups = tuple(

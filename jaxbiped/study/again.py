@@ -11,7 +11,9 @@ import jax.numpy as jnp
 import polars as pl
 
 from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.source import OwnFamily, find_family
 from jaxbiped.config import parse
+from jaxbiped.core.registry import FAMILIES
 from jaxbiped.errors import InputError
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig
@@ -22,6 +24,7 @@ from jaxbiped.study.components import hash_of
 from jaxbiped.study.evaluate import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
 from jaxbiped.study.runner import check_mission, play_one, seeing
+from jaxbiped.study.schema import KNOWN
 from jaxbiped.study.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.sweep import point_at
 
@@ -100,6 +103,7 @@ def play_again(
     again = strategy_again(manifest, strategy, own or {})
     config, families, population = mission_of(manifest, point, values)
     populations = None if population == PopulationConfig() else stack([population.traced()])
+    families = families_again(manifest, families)
     batch, seeds = draw(jax.random.key(manifest.seed), jnp.asarray(arenas), families, populations)
     check_mission(config)
     each = [jax.tree.map(lambda leaf, k=k: leaf[k], batch) for k in range(len(arenas))]
@@ -119,6 +123,20 @@ def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -
     if hash_of(own[name]) not in hashes:
         raise InputError("has other code or other numbers than in the study", field="strategy", value=name)
     return own[name]
+
+
+def families_again(manifest: Manifest, names: Sequence[str]) -> tuple[str | OwnFamily, ...]:
+    """The families of a study: those that are built in, and scenes and registered ones that have the hash it tells."""
+    found = []
+    for name in names:
+        if name not in KNOWN and not name.endswith(".toml") and name not in FAMILIES:
+            message = "is not built in: its arenas can be drawn again only by a program that registers it"
+            raise InputError(message, field="families", value=name)
+        found.append(find_family(name))
+        hash_then = manifest.config.get("components", {}).get(name)
+        if not isinstance(found[-1], str) and found[-1].digest() != hash_then:
+            raise InputError("is not what it was in the study", field="families", value=name)
+    return tuple(found)
 
 
 def mission_of(

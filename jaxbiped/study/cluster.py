@@ -34,7 +34,7 @@ from jaxbiped.mission.queue import Tally
 from jaxbiped.study import evaluate, worker
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress
-from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards, strategies_of
+from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.worker import Compute
 
 ANSWER = 5.0  # [s] for the scheduler to answer
@@ -90,7 +90,7 @@ class Cluster:
         done: Collection[int] = (),
     ) -> Iterator[tuple[Shard, pl.DataFrame]]:
         """As `evaluate.evaluate`."""
-        groups = group_points(points or only_point(config), strategies_of(config))
+        groups = groups_of(config, points)
         left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
         total = sum(shard.count * len(groups[shard.group].population_of) for shard in left)
         board, topic = Board(on_progress, total), f"jaxbiped-{uuid.uuid4()}"

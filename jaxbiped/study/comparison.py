@@ -12,7 +12,7 @@ import polars as pl
 from jaxbiped.errors import InputError
 from jaxbiped.study.intervals import NOTHING, Estimate, proportion
 from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
-from jaxbiped.study.schema import CODES, KNOWN, SCENE, ordered, validate
+from jaxbiped.study.schema import CODES, ordered, ordered_families, validate
 
 QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about
 
@@ -157,10 +157,8 @@ def compare_named(
 def strata(frame: pl.DataFrame) -> Iterator[tuple[Stratum, pl.DataFrame]]:
     """All rows, then those of each family, then those of each third of the arenas by difficulty."""
     yield ALL, frame
-    for family in (*KNOWN, SCENE):
-        rows = frame.filter(pl.col("family") == family)
-        if len(rows):
-            yield Stratum("family", family), rows
+    for family in ordered_families(frame["family"]):
+        yield Stratum("family", family), frame.filter(pl.col("family") == family)
     difficulty = pl.col("difficulty")
     values = frame.unique("arena")["difficulty"].to_numpy()
     # Arenas that are equally difficult stay together, so thirds can be unequal, or fewer than three.

@@ -1,9 +1,10 @@
-"""What people brought to a study: its strategies that are not built in, and a hash of each one's code and numbers."""
+"""What people brought to a study: strategies and families that are not built in, and a hash of each one's code."""
 
 from __future__ import annotations
 
 from typing import TypeVar
 
+from jaxbiped.arenas.source import find_family
 from jaxbiped.core.code_hash import component_hash
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.config import StudyConfig
@@ -22,10 +23,11 @@ def fingerprinted(config: C) -> C:
     """The config with `components` filled in, so that its hash covers the code of what people brought.
 
     Raises:
-      InputError: a strategy that is not known, or whose module cannot be imported.
+      InputError: a strategy or family that is not known, or whose module or file cannot be used.
     """
-    own = [name for name in config.strategies if name not in STRATEGIES]
-    made = {}
-    for name in own:
-        made[name] = hash_of(find_strategy(name))
+    made = {name: hash_of(find_strategy(name)) for name in config.strategies if name not in STRATEGIES}
+    for name in config.families:
+        family = find_family(name)
+        if not isinstance(family, str):
+            made[name] = family.digest()
     return config if made == config.components else config.model_copy(update={"components": made})

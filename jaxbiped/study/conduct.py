@@ -12,7 +12,7 @@ from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress, evaluate
-from jaxbiped.study.groups import Point, Shard, group_points, only_point, shards, strategies_of
+from jaxbiped.study.groups import Point, Shard, groups_of, only_point, shards
 from jaxbiped.study.resume import resume as take_up
 
 # Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.
@@ -59,7 +59,7 @@ def conduct(
     else:
         results = store.create(folder, config, **kind)
     with results:
-        judge = in_order(enough, parts=1 if swept else len(group_points(points, strategies_of(config))))
+        judge = in_order(enough, parts=1 if swept else len(groups_of(config, points)))
         paths = store.shard_paths(results.folder) if enough is not never else []
         if not any(judge(store.shard_number(path), pl.read_parquet(path)) for path in paths):
             for shard, frame in engine(config, on_progress, points=points, done=results.done()):
@@ -97,7 +97,7 @@ def in_order(enough: Callable[[pl.DataFrame], bool], parts: int = 1) -> Callable
 
 def shard_rows(config: StudyConfig, points: Sequence[Point], *, swept: bool = False) -> list[int]:
     """Rows of each shard, by its number."""
-    sizes = [len(group.points) * len(group.strategies) for group in group_points(points, strategies_of(config))]
+    sizes = [len(group.points) * len(group.strategies) for group in groups_of(config, points)]
     return [shard.count * sizes[shard.group] for shard in shards(config, len(sizes), swept=swept)]
 
 

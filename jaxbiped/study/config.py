@@ -9,12 +9,23 @@ import tyro
 
 from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
+from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
 from jaxbiped.core.registry import PLACE
 from jaxbiped.core.registry import STRATEGIES as REGISTERED
 from jaxbiped.mission.config import SIMULATED, MissionConfig
 from jaxbiped.study.names import FAMILIES, KNOWN, MOVING, STRATEGIES
 
+
+def known_family(name: str) -> str:
+    """A family that is built in or registered, a scene file, or `package.module:name`; nothing is read or imported."""
+    if not (name in KNOWN or name.endswith(".toml") or FAMILIES_OWN.knows(name) or PLACE.fullmatch(name)):
+        known = ", ".join(dict.fromkeys([*KNOWN, *FAMILIES_OWN]))
+        raise ValueError(f"must be one of {known}, a scene file (.toml), or package.module:name of your own generator")
+    return name
+
+
 Family = Literal[KNOWN]
+AnyFamily = Annotated[str, pydantic.AfterValidator(known_family)]
 
 
 def known_strategy(name: str) -> str:
@@ -34,8 +45,9 @@ class StudyConfig(Model):
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
     """Arena k and its noise are functions of this seed and of k alone."""
     arenas: Annotated[int, pydantic.Field(ge=1, le=100_000_000)] = 600
-    families: Annotated[tuple[Family, ...], pydantic.Field(min_length=1)] = FAMILIES
-    """They take turns: arena k is of family k modulo their number."""
+    families: Annotated[tuple[AnyFamily, ...], pydantic.Field(min_length=1)] = FAMILIES
+    """They take turns: arena k is of family k modulo their number. Built in are obstacles, bump, stairs, gate, mixed,
+    clutter and traffic; a scene file (.toml) is a family with one arena; package.module:name is your own generator."""
     strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
     components: Annotated[dict[str, str], tyro.conf.Fixed] = pydantic.Field(default_factory=dict)
     """A hash of the code and the numbers of each strategy that is not built in; filled in when the study begins."""

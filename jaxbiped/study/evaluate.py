@@ -14,9 +14,9 @@ import numpy as np
 import polars as pl
 from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 
-from jaxbiped import arenas as arena_room
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
+from jaxbiped.arenas.source import OwnFamily, draw_arena, find_family, name_of
 from jaxbiped.devices import by_rows, mesh_of
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
@@ -34,9 +34,9 @@ from jaxbiped.mission.queue import (
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import Group, Point, Shard, group_points, only_point, shards, strategies_of
+from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.runner import batch_driver
-from jaxbiped.study.schema import KNOWN, SCENE, SCHEMA
+from jaxbiped.study.schema import SCHEMA
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 WORKERS = 2  # queues worked off at once, a core each
@@ -67,7 +67,7 @@ def evaluate(
       points: sweep points; by default the one of `config`.
       done: numbers of shards to leave out. What others hold does not depend on them.
     """
-    groups = group_points(points or only_point(config), strategies_of(config))
+    groups = groups_of(config, points)
     left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
     rows = [shard.count * len(groups[shard.group].population_of) for shard in left]
     before, total = Tally(0, 0), sum(rows)
@@ -95,20 +95,24 @@ def compute(
     # The last shard is filled up with arenas beyond the study, so that all shards share one program.
     size = min(config.shard, config.arenas)
     index = shard.first + jnp.arange(size)
-    batch, seeds = draw(jax.random.key(config.seed), index, config.families, group.populations)
+    families = tuple(map(find_family, config.families))
+    batch, seeds = draw(jax.random.key(config.seed), index, families, group.populations)
     with batch_driver(group, workers) as play:
         result = play(
             batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
         )
     batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
     plan = plan_all(batch, group, size)
-    return frame(np.arange(shard.first, shard.first + shard.count), batch, group, result, plan)
+    return frame(np.arange(shard.first, shard.first + shard.count), batch, group, families, result, plan)
 
 
 @with_own_settings
 @partial(jax.jit, static_argnames=("families",))
 def draw(
-    key: PRNGKeyArray, index: Int[Array, "A"], families: tuple[str, ...], populations: Population | None = None
+    key: PRNGKeyArray,
+    index: Int[Array, "A"],
+    families: tuple[str | OwnFamily, ...],
+    populations: Population | None = None,
 ) -> tuple[Arena, UInt32[Array, "A"]]:
     """Arenas `index` of the population, and the seeds of their missions' noise: the same for all strategies.
 
@@ -117,7 +121,7 @@ def draw(
     """
 
     def one(population: Population | None) -> Arena:
-        return jax.vmap(lambda k: arena_room.sample(key, k, families, population))(index)
+        return jax.vmap(lambda k: draw_arena(key, k, families, population))(index)
 
     if populations is None:
         batch = one(None)
@@ -231,18 +235,19 @@ def frame(
     index: Int[np.ndarray, "A"],
     batch: Arena,
     group: Group,
+    families: Sequence[str | OwnFamily],
     result: Result,
     plan: OraclePlan,
 ) -> pl.DataFrame:
     """Rows of all points and strategies on arenas `index`, the first of the batch, which is on the host."""
     count, kinds, strategies = len(index), len(group.population_of), group.strategies
-    family, difficulty = batch.family[:count], batch.difficulty[:count]
+    family, difficulty = np.array(list(map(name_of, families)))[index % len(families)], batch.difficulty[:count]
     reached = result.code == Code.REACHED
     reachable, cost, length = (values[:, :count] for values in (plan.reachable, plan.cost, plan.length))
     columns = {
         "point": np.repeat(group.points, len(strategies) * count),
         "arena": np.tile(index, kinds),
-        "family": np.tile(np.array([*KNOWN, SCENE])[family], kinds),
+        "family": np.tile(family, kinds),
         "difficulty": np.tile(difficulty, kinds),
         "strategy": np.tile(np.repeat(strategies, count), len(group.points)),
         "code": LABELS[result.code],

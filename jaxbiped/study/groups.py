@@ -11,6 +11,7 @@ from jaxtyping import Int
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.population import Population, PopulationConfig
+from jaxbiped.arenas.source import OwnFamily, area_of, find_family, name_of
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.footwork import WalkConfig
@@ -75,10 +76,32 @@ def strategies_of(config: StudyConfig) -> tuple[Strategy, ...]:
     return found
 
 
-def group_points(points: Iterable[Point], strategies: Sequence[Strategy | str]) -> tuple[Group, ...]:
+def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
+    """The families of a study, in their turns.
+
+    Raises:
+      InputError: one that is not known, a scene that is wrong, two of one name, arenas of different sizes.
+    """
+    found = tuple(map(find_family, config.families))
+    names = [name_of(item) for item in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError("two of them have this name", field="families", value=name)
+    area_of(found)
+    return found
+
+
+def group_points(
+    points: Iterable[Point],
+    strategies: Sequence[Strategy | str],
+    area: tuple[float, float] = (SIZE_X, SIZE_Y),
+) -> tuple[Group, ...]:
     """Points by what sets array shapes and code paths (`mission.program`), in the order of their first.
 
     Strategies whose planners are of different kinds are groups of their own.
+
+    Args:
+      area: [m] of all arenas.
 
     Raises:
       InputError: a point whose grid does not fit the area.
@@ -95,11 +118,20 @@ def group_points(points: Iterable[Point], strategies: Sequence[Strategy | str]) 
         simulated = point.mission.executor in SIMULATED
         walk = point.mission.walk if simulated else None
         camera = point.mission.camera if point.mission.sensor in RENDERED else None
-        together.setdefault((program(point.mission, (SIZE_X, SIZE_Y)), walk, camera), []).append(point)
+        together.setdefault((program(point.mission, area), walk, camera), []).append(point)
     kinds: dict[tuple, list[Strategy]] = {}
     for item in strategies:
         kinds.setdefault(kind_of(item), []).append(item)
     return tuple(group(*key, members, kind) for key, members in together.items() for kind in kinds.values())
+
+
+def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tuple[Group, ...]:
+    """The groups of a study, or of the sweep that has these points.
+
+    Raises:
+      InputError: strategies, families or points that do not go together.
+    """
+    return group_points(points or only_point(config), strategies_of(config), area_of(families_of(config)))
 
 
 def numbers_of(planner: Planner | None) -> tuple[str, ...]:

@@ -15,8 +15,9 @@ from jaxbiped.study.names import MEASURES
 class CompareArgs(EngineArgs, StudyConfig):
     """Compare strategies on random arenas: missions, paired statistics, tables and figures.
 
-    A study in TOML may come first; options on the command line override it. A results folder in its place, or two,
-    are compared without running again: see `jaxbiped compare FOLDER --help`.
+    A study in TOML may come first; options on the command line override it. Scenes in its place, or a folder of them,
+    are the arenas: jaxbiped compare configs/scenes/*.toml. A results folder, or two, are compared without running
+    again: see `jaxbiped compare FOLDER --help`.
     """
 
     out: Path | None = None

@@ -1,0 +1,68 @@
+"""Planners of other libraries, and of the examples, in the closed loop against `full`: README's second table.
+
+    pip install 'jaxbiped[planners]'
+    python sweeps/outside_planners.py [--arenas 600] [--seed 0] [--out FOLDER]
+
+Each is a file of under 60 lines in `sweeps/examples/planners`. All walk the same arenas with the same noise, paired
+statistics are against `full`. `plan ms` is the mean time of one plan on one core beside the other queue's; it cannot be
+told of planners that are compiled into the mission's program.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import polars as pl
+from rich.console import Console
+from rich.table import Table
+
+import jaxbiped as jb
+
+sys.path.insert(0, str(Path(__file__).parent / "examples" / "planners"))
+from clearance import Clearance
+from fast_marching import fast_marching
+from pathfinding_astar import pathfinding_astar
+from rrt_connect import rrt_connect
+from wall_follower import WallFollower
+
+STRATEGIES = ["full", Clearance(), pathfinding_astar, fast_marching, rrt_connect, WallFollower(), jb.StraightLine()]
+
+
+def main() -> None:
+    """Play the study, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--arenas", type=int, default=600)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path)
+    args = parser.parse_args()
+    study = jb.Study(jb.RandomArenas(count=args.arenas), STRATEGIES, seed=args.seed)
+    results = jb.evaluate(study, out=args.out)
+    columns = "planner", "reached %", "interval", "minus full, points", "interval", "time minus full, min", "interval"
+    table = Table(*columns, "fell, hit %", "plan ms", title=f"{args.arenas} arenas, seed {args.seed}")
+    for name in results.strategies:
+        rows = results.rows.filter(pl.col("strategy") == name)
+        own = results.compare().statistics.summary(name).success
+        cells = [name, f"{100 * own.estimate:.1f}", span(own, 100)]
+        if name == "full":
+            cells += ["", "", "", ""]
+        else:
+            pair = results.compare(name, "full").statistics.pair(name, "full")
+            time = pair.time.mean
+            cells += [f"{100 * pair.success.estimate:+.1f}", span(pair.success, 100)]
+            cells += [f"{time.estimate / 60:+.2f}" if time.valid else "-", span(time, 1 / 60, 2)]
+        hurt = rows["code"].is_in(["fell", "collided", "out_of_bounds"]).mean()
+        spent = rows["planning_time"].sum() / rows["planning_calls"].sum() if rows["planning_time"].count() else None
+        cells += [f"{100 * hurt:.1f}", "in the program" if spent is None else f"{1000 * spent:.1f}"]
+        table.add_row(*cells)
+    Console(width=160).print(table)
+
+
+def span(value, scale: float, digits: int = 1) -> str:
+    """An interval."""
+    if not value.valid or value.low is None:
+        return "-"
+    return f"[{scale * value.low:.{digits}f}, {scale * value.high:.{digits}f}]"
+
+
+if __name__ == "__main__":
+    main()
