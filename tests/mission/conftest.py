@@ -19,6 +19,7 @@ from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
 from jaxbiped.study.evaluate import draw
 from jaxbiped.study.names import STRATEGIES
+from tests.mission.replay import Moment
 
 ARENAS, SETTINGS, JOBS, SLOTS = 32, 16, 32, 8
 CONFIG = MissionConfig()
@@ -61,6 +62,7 @@ class Log:
     levels: np.ndarray  # [T, H, W]
     votes: np.ndarray  # [T, H, W, 4]
     command: Command  # leaves [T]
+    moments: tuple[Moment, ...]  # [T]
     world: World  # at the end
 
 
@@ -68,11 +70,14 @@ def step_through(arena, setting, seed, program=PROGRAM) -> Log:
     """One mission by a Python loop over `cycle`, alone in its batch, as the package's stepped driver has it."""
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (arena, setting))
     world, mind = compiled_start(*batch, jnp.asarray([seed]), program.spec)
-    moments = []
+    taken, moments = [], []
     while world.code[0] == Code.RUNNING:
-        world, mind, _, command, thought = turn_once(world, mind, *batch, program)
-        moments.append(row((thought.classes, thought.levels, mind.grid_map.votes, command), 0))
-    return Log(*stack(moments), row(world, 0))
+        before = world, mind.look
+        world, mind, view, command, thought = turn_once(world, mind, *batch, program)
+        taken.append(row((thought.classes, thought.levels, mind.grid_map.votes, command), 0))
+        after = view, thought.pose, mind.grid_map, thought.classes, thought.levels, thought.ij
+        moments.append(Moment(*row((*before, *after), 0)))
+    return Log(*stack(taken), tuple(moments), row(world, 0))
 
 
 compiled_start = jax.jit(jax.vmap(start, in_axes=(0, 0, 0, None)), static_argnums=3)

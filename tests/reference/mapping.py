@@ -48,7 +48,13 @@ def update(grid_map, view, pose, body, params, spec, refit=True):
 
 def place(view, pose, params, spec):
     """Voxel (i, j, k) [3, n], height and weight of each point that counts, and how much its height does."""
-    (height, width), depth = spec.shape, spec.levels
+    at, *rest = coordinates(view, pose, params, spec)
+    index, inside = voxels_at(at, spec)
+    return index[:, inside].astype(int), *(values[inside] for values in rest)
+
+
+def coordinates(view, pose, params, spec):
+    """(y, x, z) [3, n] in sides of a voxel of each point in range, on the grid or not; the rest as of `place`."""
     numbers = np.stack([view.x, view.y, view.z, view.weight]).astype(np.float32)
     x, y, z, weight = numbers[:, np.isfinite(numbers).all(0) & (numbers[3] > 0)]
     with np.errstate(over="ignore"):
@@ -57,12 +63,14 @@ def place(view, pose, params, spec):
     cos, sin = np.cos(np.float32(pose.yaw)), np.sin(np.float32(pose.yaw))
     world_x, world_y = pose.x + cos * x - sin * y, pose.y + sin * x + cos * y
     pitch, rise = np.float32(spec.pitch), np.float32(spec.level_height)
-    index = np.stack(
-        [np.floor(world_y / pitch), np.floor(world_x / pitch), np.round((z + pose.z) / rise) - spec.lowest]
-    )
-    inside = ((index >= 0) & (index < np.array([[height], [width], [depth]]))).all(0)
     near = 1 / (1 + (x**2 + y**2) / np.float32(params.height_range) ** 2)
-    return index[:, inside].astype(int), (z + pose.z)[inside], weight[inside], near[inside]
+    return np.stack([world_y / pitch, world_x / pitch, (z + pose.z) / rise]), z + pose.z, weight, near
+
+
+def voxels_at(at, spec):
+    """Index (i, j, k) [3, n] of the voxel that holds each of `coordinates`, and whether the grid has it."""
+    index = np.stack([np.floor(at[0]), np.floor(at[1]), np.round(at[2]) - spec.lowest])
+    return index, ((index >= 0) & (index < np.array([*spec.shape, spec.levels])[:, None])).all(0)
 
 
 def count_in(index, weight, shape):
@@ -71,13 +79,13 @@ def count_in(index, weight, shape):
     return sums.reshape(shape).astype(np.float32)
 
 
-def add_surfaces(surfaces, voxels, above, weight, spec):
+def add_surfaces(surfaces, voxels, above, weight, spec, face=FACE):
     """With the points of one view, and their heights: of raised levels, without the faces below them."""
     level = np.maximum(voxels[2] + spec.lowest, 0)
     rise = above - level * np.float32(spec.level_height)
     lowest = np.full(surfaces.weight.shape, -np.inf, np.float32)
     known = surfaces.weight > 0
-    lowest[known] = surfaces.rise[known] / np.maximum(surfaces.weight[known], np.float32(1e-6)) - np.float32(FACE)
+    lowest[known] = surfaces.rise[known] / np.maximum(surfaces.weight[known], np.float32(1e-6)) - np.float32(face)
     lowest[0] = -np.inf
     good = level < spec.ground_levels
     good[good] = rise[good] >= lowest[level[good], voxels[0, good], voxels[1, good]]
@@ -273,11 +281,12 @@ def mark_footprint(grid_map, x, y, z, radius, spec):
     return add_votes(marked, count, *np.full((2, *spec.shape), [[[kind]], [[level]]]))
 
 
-def level_view(view, support, params, spec):
+def level_view(view, support, params, spec, border=0.0, reaches=0.0, plain=0.0):
     """Floor-plane refit by `numpy.linalg.lstsq` in double precision; the package's rounds and prior.
 
     Each half level has a lift of its own as one more unknown; the second of two fits takes those that stand for more
-    than noise as known, and the others for none.
+    than noise as known, and the others for none. The last arguments [m] move the fit's thresholds: borders of half
+    levels, reaches of rounds, and what is more than noise.
     """
     numbers = np.stack([view.x, view.y, view.z, view.weight]).astype(float)
     stride = max(1, numbers.shape[1] // SAMPLE)
@@ -290,7 +299,7 @@ def level_view(view, support, params, spec):
 
     def off_level(plane, lifts):
         above = z - features @ plane
-        level = np.clip(np.round((above + support) / rise), 0, count - 1).astype(int)
+        level = np.clip(np.round((above + support - border) / rise), 0, count - 1).astype(int)
         return level, above - (level * rise - support) - lifts[level]
 
     def prior(*sds):
@@ -300,12 +309,12 @@ def level_view(view, support, params, spec):
     for reach, width in ROUNDS:
         level, residual = off_level(plane, lifts)
         weight = np.maximum(1 - (residual / (width * params.refit_inlier)) ** 2, 0) * np.sqrt(pixels)
-        weight[np.hypot(x, y) >= reach] = 0
+        weight[np.hypot(x, y) >= reach + reaches] = 0
         target = z - (level * rise - support)
         both = np.concatenate([features, np.eye(count)[level]], axis=1) * weight[:, None]
         known = prior(OWN_HEIGHT, PRIOR_SLOPE, PRIOR_SLOPE, *[OFF_LEVEL] * count)
         found = np.linalg.lstsq(np.concatenate([both, known]), np.append(target * weight, np.zeros(3 + count)))[0]
-        lifts = np.where(np.abs(found[3:]) > PLAIN, found[3:], 0)
+        lifts = np.where(np.abs(found[3:]) > PLAIN + plain, found[3:], 0)
         left = np.concatenate([features * weight[:, None], prior(PRIOR_OFFSET, PRIOR_SLOPE, PRIOR_SLOPE)])
         plane = np.linalg.lstsq(left, np.append((target - lifts[level]) * weight, [0, 0, 0]))[0]
 
