@@ -33,11 +33,13 @@ COMMANDS = {
     "fit-sensor": ("fit_sensor", "FitSensorArgs", "fit the noise of the ray-cast sensor to rendered pairs", False),
     "reproduce": ("reproduce", "ReproduceArgs", "repeat the paper, its figures and ours on one page", False),
     "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
+    "cache": ("cache", "CacheArgs", "show or clear what is kept on disk to start sooner", False),
     "view": ("view", "ViewArgs", "show missions in the browser", False),
 }
 # What a command is when its first argument is a results folder: another module, other options.
 ON_FOLDERS = {"compare": ("stored", "StoredArgs")}
 ON_SCENES = ("compare",)  # commands whose first arguments may be scenes, or a folder of them
+WITHOUT_DEVICES = ("cache",)
 # Options of a mission on which the defaults of other options depend.
 EARLY = ("preset", "executor", "sensor", *(f"camera.{name}" for name in ("width", "height", "columns", "rows")))
 WRONG_INPUT = 2  # exit status
@@ -136,7 +138,8 @@ def dispatch(name: str, rest: list[str]) -> int:
         if not stop.code:
             raise
         raise one_line(said.getvalue()) from None
-    surroundings.check_devices()
+    if name not in WITHOUT_DEVICES:
+        surroundings.check_devices()
     return importlib.import_module(f"jaxbiped.commands.{module_name}").main(args)
 
 

@@ -14,6 +14,8 @@ from typing import Any, TypeVar
 import jax
 import numpy as np
 
+from jaxbiped.core.program_cache import keep_programs
+
 SETTINGS = (
     (jax.enable_x64, False),
     (jax.numpy_rank_promotion, "allow"),
@@ -27,6 +29,8 @@ SETTINGS = (
 NARROW = {np.dtype(name + "64"): np.dtype(name + "32") for name in ("float", "int", "uint")}
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+keep_programs()
 
 
 @contextlib.contextmanager

@@ -14,7 +14,7 @@ from jaxbiped.mapping import class_grid, moving_ai, ros_map
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.inflate import inflate
-from jaxbiped.report.pictures import CENTIMETRES, METRES, Axis
+from jaxbiped.report.axis import CENTIMETRES, METRES, Axis
 
 SUFFIXES = {
     ".map": "Moving AI map",

@@ -21,7 +21,6 @@ from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, next_step
-from jaxbiped.report import pictures
 from jaxbiped.terminal import legible
 
 NO_PATH = 1  # exit status
@@ -164,6 +163,8 @@ def report(source: MapSource, plan: Plan, args: PlanArgs) -> None:
 
 def write(source: MapSource, plan: Plan, folder: Path, args: PlanArgs) -> None:
     """Fill a folder with the path, as CSV and as npz, and a picture."""
+    from jaxbiped.report import pictures  # loads matplotlib
+
     grid, cells = source.grid, plan.cells_ij
     xy = grid.centres_xy(cells)
     classes, levels = grid.classes[tuple(cells.T)], grid.levels[tuple(cells.T)]

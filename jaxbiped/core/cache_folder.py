@@ -8,6 +8,8 @@ from pathlib import Path
 
 VARIABLE = "JAXBIPED_CACHE"  # a folder, or "off"
 OFF = "off"
+KERNELS, PROGRAMS = "kernels", "programs"  # folders in it
+MOST_PROGRAMS = 500_000_000  # bytes of all executables
 
 
 def cache_folder() -> Path | None:

@@ -58,6 +58,13 @@ class Mission:
 turn_once = partial(jax.jit, static_argnames=("program",))(cycle)
 
 
+@partial(jax.jit, static_argnames=("program",))
+def begin_once(arena: Arena, settings: Settings, seed: UInt32[Array, ""], program: Program):
+    """Arena and settings with a leading axis of 1, and world and mind before the first measurement."""
+    begun = start(arena, settings, seed, program.spec, program.localisation)
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], ((arena, settings), begun))
+
+
 @with_own_settings
 def run_logged(
     arena: Arena,
@@ -86,10 +93,7 @@ def run_bare(
     recorder: Recorder | None = None,
 ) -> World:
     """The end of one mission (no batch axis); its world has a leading axis of 1."""
-    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (arena, settings))
-    world, mind = jax.tree.map(
-        lambda leaf: leaf[None], start(arena, settings, seed, program.spec, program.localisation)
-    )
+    batch, (world, mind) = begin_once(arena, settings, seed, program)
     while world.code[0] == Code.RUNNING:
         before = world
         seen = eyes.see(world, mind, *batch) if eyes else None

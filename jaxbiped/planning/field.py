@@ -17,12 +17,14 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.core.batching import fold, folding_vmap, unfold, without_gradient
 from jaxbiped.core.checks import cells, leading_shape, reals
+from jaxbiped.core.program_cache import keep_programs
 from jaxbiped.devices import by_rows, cores, mesh_of
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled, wavefront
 from jaxbiped.planning.arguments import are_classes, grid_arguments
 from jaxbiped.planning.costs import Costs, Rules, half_edges, tables
 
+keep_programs()
 METHODS = ("wavefront", *compiled.METHODS)
 CHUNK = compiled.LANES  # arenas settled together: what fits the cache
 PIECES = 4  # for each core, so that a slow piece does not leave the other cores idle

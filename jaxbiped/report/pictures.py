@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib.patches as patches
@@ -21,6 +20,9 @@ from jaxbiped.files import write_whole
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import Mark, MissionLog, Outline
+from jaxbiped.report.axis import CENTIMETRES as CENTIMETRES
+from jaxbiped.report.axis import METRES as METRES
+from jaxbiped.report.axis import Axis as Axis
 from jaxbiped.report.style import own_style
 
 COLOURS = {
@@ -36,18 +38,6 @@ OUTLINES = {"obstacle": "#8e1f1c", "bump": "#163f75", "gate": "#5b2a86"}
 GOAL_RADIUS = 0.10  # [m] "reached" (paper, 3.1)
 MOST_CELLS_LINED = 6000  # beyond, cells are too small for lines around them and numbers in them
 MOST_ARROWS = 150  # beyond, a plan is a line
-
-
-@dataclass(frozen=True)
-class Axis:
-    """How metres are shown: in which unit, and whether y points down the page."""
-
-    unit: str = "cm"
-    per_metre: float = 100.0
-    y_down: bool = False
-
-
-CENTIMETRES, METRES = Axis(), Axis("m", 1.0)
 
 
 def class_image(classes: Int8[np.ndarray, "H W"], levels: Int8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:

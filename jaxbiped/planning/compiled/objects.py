@@ -4,18 +4,15 @@ Numba's own cache cannot keep these kernels: they are closures over instructions
 apart. But all that they are made of is known: the sources of `planning` and of the classes of cells, the versions of
 Python, Numba and LLVM, and the kind of processor. A hash of these is the key: a changed program is never loaded.
 
-A file is written whole under another name and then renamed: many processes may do so at once. One that is damaged, cut
-short or not readable is compiled anew; a folder that cannot be written to is done without.
+A file that is damaged, cut short or not readable is compiled anew; a folder that cannot be written to is done without.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import platform
 import sys
-import tempfile
 from functools import cache
 from pathlib import Path
 
@@ -25,24 +22,20 @@ import numba
 from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 
-from jaxbiped.core.cache_folder import cache_folder
+from jaxbiped.core import kept_files
+from jaxbiped.core.cache_folder import KERNELS, cache_folder
 
 PLANNING = Path(__file__).parents[1]
 SOURCES = (PLANNING, PLANNING.parent / "mapping" / "grid.py")
 MAGIC = b"jaxbiped kernel 1\n"
-DIGEST = 32  # bytes of SHA-256
 OLDEST = 8  # versions of the program whose kernels are kept
 
 
 def load(name: str) -> int | None:
     """The address of the C function `name` of an earlier process; None where none is kept."""
     folder = kernel_folder()
-    try:
-        data = (folder / name).read_bytes() if folder else b""
-    except OSError:
-        return None
-    head, digest, rest = data[: len(MAGIC)], data[len(MAGIC) :][:DIGEST], data[len(MAGIC) + DIGEST :]
-    if head != MAGIC or hashlib.sha256(rest).digest() != digest:
+    rest = kept_files.read(folder / name, MAGIC) if folder else None
+    if rest is None:
         return None
     symbol, _, machine_code = rest.partition(b"\n")
     rtsys.initialize(cpu_target.target_context)  # what machine code allocates memory by; compiling would do so, too
@@ -60,17 +53,8 @@ def store(name: str, handler) -> None:
         library = handler._library
         machine_code = library.codegen._tm.emit_object(library._final_module)
         rest = handler.native_name.encode() + b"\n" + machine_code
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=folder, prefix=".", delete=False) as file:
-            try:
-                file.write(MAGIC + hashlib.sha256(rest).digest() + rest)
-                file.close()
-                os.replace(file.name, folder / name)
-            except OSError:
-                with contextlib.suppress(OSError):
-                    os.unlink(file.name)
-                raise
-        sweep_up(folder.parent)
+        if kept_files.write(folder / name, MAGIC, rest):
+            sweep_up(folder.parent)
 
 
 def sweep_up(parent: Path) -> None:
@@ -86,7 +70,7 @@ def kernel_folder() -> Path | None:
     """The folder of this program's kernels on this kind of processor; None where none are kept."""
     folder = cache_folder()
     try:
-        return folder / "kernels" / key() if folder else None
+        return folder / KERNELS / key() if folder else None
     except OSError:  # sources that cannot be read
         return None
 

@@ -127,7 +127,7 @@ def settle_grids(tables, classes, levels, goal_ij):
         foreign.expect(array, shape, dtype)
     if batch < lanes:
         inputs = [jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1)) for a in inputs]
-    many, size = max(batch, lanes), int(grids.room_size(height, width))
+    many, size = max(batch, lanes), grids.room_size.py_func(height, width)
     results = (
         jax.ShapeDtypeStruct((many, height, width), jnp.float32),
         jax.ShapeDtypeStruct((many,), jnp.int32),
@@ -154,7 +154,7 @@ def settle_arrays(tables, classes, levels, goal_ij, cost, steps, settled) -> Non
         foreign.expect(array, shape, dtype)
     if batch < LANES or not all(array.flags.c_contiguous for array in (*inputs, cost, steps, settled)):
         raise ValueError(f"needs at least {LANES} arenas, in contiguous arrays")
-    size = grids.room_size(height, width)
+    size = grids.room_size.py_func(height, width)  # compiling it would take longer
     name, _ = target(GRIDS)
     room = aligned(size, np.float64), aligned(4 * size, np.float32), aligned(3 * size, np.int8)
     foreign.call(name, inputs, (cost, steps, settled, *room))

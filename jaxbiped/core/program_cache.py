@@ -1,0 +1,95 @@
+"""XLA's executables on disk: what one process compiled, the next one loads.
+
+JAX has a cache of its own, of which this is the part that reads and writes files: bounded in size without another
+library, silent where the disk is full, read-only or damaged, and healed by the next writer. JAX's key is a hash of the
+lowered program, of the versions of JAX and XLA and of their options; the folder's name is one of the processor, whose
+instructions an executable may use. An executable calls kernels (`planning.compiled`) by name, and finds those of its
+own process: it holds none of their code.
+
+A cache that the user has chosen (`JAX_COMPILATION_CACHE_DIR`) is left to JAX.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from functools import cache
+from pathlib import Path
+
+import jax
+
+from jaxbiped.core import kept_files
+from jaxbiped.core.cache_folder import MOST_PROGRAMS, PROGRAMS, cache_folder
+
+KIND = b"jaxbiped program 1\n"
+QUICK = 0.05  # [s] of compiling: what takes less is compiled again
+SHARE = 16  # so many files are written between two looks at their sizes
+
+
+def keep_programs() -> None:
+    """Keep executables from now on, unless the user has chosen a cache of their own. Costs nothing the second time."""
+    try:
+        from jax._src import compilation_cache
+        from jax._src.compilation_cache_interface import CacheInterface
+
+        with compilation_cache._cache_initialized_mutex:
+            if jax.config.jax_compilation_cache_dir or compilation_cache._cache_initialized:
+                return
+            compilation_cache._cache = kind_of_cache(compilation_cache, CacheInterface)()
+            compilation_cache._cache_initialized = True
+        if jax.config.jax_persistent_cache_min_compile_time_secs == 1.0:  # as it is by default
+            jax.config.update("jax_persistent_cache_min_compile_time_secs", QUICK)
+    except (ImportError, AttributeError):  # a JAX that is built otherwise inside keeps nothing
+        return
+
+
+@cache
+def kind_of_cache(compilation_cache, interface: type) -> type:
+    """The class of our cache, as JAX wants it."""
+
+    class Programs(interface):
+        written = 0
+
+        @property
+        def _path(self) -> Path:
+            return program_folder() or Path()
+
+        def get(self, key: str) -> bytes | None:
+            if chosen := self.chosen():
+                return chosen.get(key)
+            folder = program_folder()
+            return kept_files.read(folder / key, KIND) if folder else None
+
+        def put(self, key: str, value: bytes) -> None:
+            if chosen := self.chosen():
+                chosen.put(key, value)
+            elif folder := program_folder():
+                kept_files.write(folder / key, KIND, value)
+                if self.written % SHARE == 0:
+                    kept_files.prune(folder.parent, MOST_PROGRAMS)
+                self.written += 1
+
+        def chosen(self):
+            """The cache of a folder that the user has named since."""
+            folder = jax.config.jax_compilation_cache_dir
+            return compilation_cache.get_file_cache(folder)[0] if folder else None
+
+    return Programs
+
+
+def program_folder() -> Path | None:
+    """The folder of executables for this kind of processor; None where none are kept."""
+    folder = cache_folder()
+    return folder / PROGRAMS / processor() if folder else None
+
+
+@cache
+def processor() -> str:
+    """Sixteen hex digits of what this processor is, and what it can do."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:  # no Linux
+        lines = []
+    told = {line for line in lines if line.partition(":")[0].strip() in ("flags", "Features", "model name", "CPU part")}
+    facts = (platform.system(), platform.machine(), platform.processor(), sorted(told))
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:16]
