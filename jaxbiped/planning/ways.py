@@ -41,18 +41,13 @@ def cells_along(points_ij: Sequence[Sequence[float]] | Float[np.ndarray, "n 2"])
     for a, b in itertools.pairwise(points):
         crossings = []
         for axis in (0, 1):
+            # A point on a line between two cells is of the upper one, so going down from it crosses that line at once.
             low, high = sorted((a[axis], b[axis]))
-            lines = np.arange(np.floor(low) + 1, np.ceil(high))
+            lines = np.arange(np.floor(low) + 1, np.floor(high) + 1)
             way = 1 if b[axis] > a[axis] else -1
             crossings += [((line - a[axis]) / (b[axis] - a[axis]), axis, way) for line in lines]
         for _, axis, way in sorted(crossings):
             cell = list(cells[-1])
             cell[axis] += way
             cells.append(tuple(cell))
-        last = tuple(int(v) for v in np.floor(b))  # a point on a line between cells belongs to the later one
-        for axis in (0, 1):
-            while cells[-1][axis] != last[axis]:
-                cell = list(cells[-1])
-                cell[axis] += 1 if last[axis] > cell[axis] else -1
-                cells.append(tuple(cell))
-    return np.array([cell for k, cell in enumerate(cells) if k == 0 or cell != cells[k - 1]])
+    return np.array(cells)
