@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -23,6 +24,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes
 
 Generator = Callable[[PRNGKeyArray], Arena]
+NAME = re.compile(r"[A-Za-z][\w .+-]{0,39}")  # shown in tables, figures and pages
 OWN = 2  # fold_in of an arena's key, for generators that people bring
 
 
@@ -38,6 +40,11 @@ class Family:
 
     name: str
     generator: Generator = field(repr=False)
+
+    def __post_init__(self):
+        if not isinstance(self.name, str) or not NAME.fullmatch(self.name):
+            message = "must begin with a letter and have at most 40 letters, digits, blanks and . _ + -"
+            raise InputError(message, field="name of a family", value=self.name)
 
     def arena(self, key: PRNGKeyArray) -> Arena:
         """One arena, checked.
