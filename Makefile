@@ -1,4 +1,5 @@
-# `make compare` runs the main study, `make test` the tests; both create .venv first.
+# `make compare` runs the main study, `make test` the tests, and `make test-all` the slow ones, too, with a million maps
+# against Dijkstra; all create .venv first.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
@@ -22,6 +23,7 @@ test: install
 
 test-all: install
 	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m tests.planning.million
 
 lint: install
 	$(BIN)/ruff check .

@@ -137,7 +137,7 @@ def dispatch(name: str, rest: list[str]) -> int:
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise one_line(said.getvalue()) from None
+        raise one_line(said.getvalue(), name, rest) from None
     if name not in WITHOUT_DEVICES:
         surroundings.check_devices()
     return importlib.import_module(f"jaxbiped.commands.{module_name}").main(args)
@@ -204,15 +204,41 @@ def defaults(options: type[Model], data: dict[str, Any], path: Path | None) -> M
         raise input_error(error, prefix="--") from None
 
 
-def one_line(box: str) -> InputError:
-    """The error that tyro draws as a box, as one line of ours: what stands between its title and its first rule.
+def one_line(box: str, name: str, rest: Sequence[str] = ()) -> InputError:
+    """The error that tyro draws as a box, as one line of ours, in our words.
 
-    Rules are drawn with lines or, where the terminal has none, with dashes, one of them under the title.
+    What counts stands between the box's title and its first rule. Rules are drawn with lines or, where the terminal has
+    none, with dashes, one of them under the title.
+
+    Args:
+      name: of the command; `rest` is what it was given.
     """
     rows = [row for line in box.splitlines() if (row := line.strip("│| "))]
     rows = itertools.dropwhile(is_rule, rows[1:])
     message = " ".join(itertools.takewhile(lambda row: not is_rule(row), rows))
     message = re.sub(r"\[/?bold\]", "", message)
+    listed = f"`jaxbiped {name} --help` lists what {name} takes"
+    if found := re.match(r"Unrecognized options: (.*)", message):
+        words = found[1].split(", ")
+        if not words[0].startswith("-"):
+            return InputError(f"is one word too many; {listed}", field=words[0])
+        meant = re.search(r"Perhaps you meant:[\s│|]*(--[\w.-]+)", box)
+        hint = f"did you mean {meant[1]}?" if meant else listed
+        return InputError(f"is no option of jaxbiped {name}; {hint}", field=words[0].partition("=")[0])
+    if found := re.match(r"Missing value for argument '(.*?)'. Expected (\d+)", message):
+        many = int(found[2])
+        return InputError(f"must be given {f'{many} values' if many > 1 else 'a value'}", field=found[1])
+    if message.startswith("Missing from"):
+        lines = itertools.dropwhile(lambda line: "Missing from" not in line, box.splitlines())
+        lines = itertools.takewhile(lambda line: not is_rule(line.strip("│| ")), lines)
+        missing = [found[1] for line in lines if (found := re.match(r". {5}(\S.*?)[ │|]*$", line))]  # not their texts
+        return InputError(f"must be given; {listed}", field=", ".join(missing) or None)
+    if found := re.match(r"invalid choice (.*) for argument '(.*?)'. Expected one of \((.*?),?\)", message):
+        return InputError(f"must be one of {found[3].replace(chr(39), '')} (got {found[1]})", field=found[2])
+    if found := re.match(r"Error parsing (\S+): no type matching (.*?) could be instantiated from \[(.*?)\]", message):
+        kinds = [kind for kind in re.findall(r"\{(.*?)\}", found[2]) if kind != "None"]
+        wanted = " or ".join(map(in_words, kinds))
+        return InputError(f"must be {wanted} (got {found[3].replace(chr(39), '').replace(',', '')})", field=found[1])
     number = re.match(
         r"Error parsing (\S+): (invalid literal for int|could not convert string to float)[^:]*: (.*)", message
     )
@@ -224,11 +250,24 @@ def one_line(box: str) -> InputError:
         message,
     )
     if model:
-        place, name, what, value = model.groups()
+        place, field, what, value = model.groups()
         place = place.lstrip("-").removeprefix("mission.")
-        field = ".".join(part for part in (place if place[:1].islower() else "", name) if part)
-        return InputError(f"{what.removeprefix('Value error, ')} (got {value})", field=f"--{field.replace('_', '-')}")
-    return InputError(message or "options that cannot be used")
+        field = ".".join(part for part in (place if place[:1].islower() else "", field) if part)
+        what = re.sub(r"^[A-Z]\w* should (be|have)", r"must \1", what.removeprefix("Value error, "))
+        what = re.sub(r" after validation, not \d+$", "", what)
+        return InputError(f"{what} (got {value})", field=f"--{field.replace('_', '-')}")
+    if not message or message.startswith("Could not create"):
+        return InputError(f"cannot be used; {listed}", field="options", value=" ".join(rest))
+    return InputError(message)
+
+
+def in_words(kind: str) -> str:
+    """What tyro's name of a kind of argument stands for."""
+    words = kind.split()
+    if set(words) <= {"FLOAT", "INT"}:
+        whole = "whole " if set(words) == {"INT"} else ""
+        return f"{len(words)} {whole}numbers" if len(words) > 1 else f"a {whole}number"
+    return kind
 
 
 def is_rule(row: str) -> bool:

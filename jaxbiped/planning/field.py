@@ -138,7 +138,7 @@ def _from_grids(classes, levels, each, goal_ij) -> CostToGo:
     valid &= are_classes(classes)
     goal_ij = jnp.where(valid[:, None], goal_ij, -1)
     with jax.enable_x64(True):
-        cost, steps, settled = compiled.settle_grids(read, classes, levels, goal_ij)
+        cost, steps, settled = compiled.solve_grids(read, classes, levels, goal_ij)
         return CostToGo(cost, steps, valid & settled)
 
 
@@ -196,7 +196,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
         rows = slice(stop - size, stop)  # the last one overlaps the one before: one program
         part = jax.tree.map(lambda a: a[rows], inputs)
         if direct:
-            compiled.settle_arrays(*part, out.cost[rows], out.iterations[rows], out.converged[rows])
+            compiled.solve_arrays(*part, out.cost[rows], out.iterations[rows], out.converged[rows])
         else:
             jax.tree.map(lambda whole, a: np.copyto(whole[rows], a), out, solve(part, method))
 
@@ -207,7 +207,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
 
 
 def _prepared(inputs):
-    """Arguments of `compiled.settle_arrays`, all but its results; and which arenas are valid."""
+    """Arguments of `compiled.solve_arrays`, all but its results; and which arenas are valid."""
     classes, levels, each, goal_ij = inputs
     read, valid = _tables(each)
     valid = np.asarray(valid)
@@ -222,9 +222,9 @@ def _solve(edges, goal_ij, method: str, valid) -> CostToGo:
     goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing is reached
     with jax.enable_x64(True):
         if method == "wavefront":
-            cost, steps, settled = wavefront.settle(edges, goal_ij)
+            cost, steps, settled = wavefront.solve_edges(edges, goal_ij)
         else:
-            cost, steps, settled = compiled.settle(edges, goal_ij, method)
+            cost, steps, settled = compiled.solve_edges(edges, goal_ij, method)
         return CostToGo(cost, steps.astype(jnp.int32), valid & settled)
 
 

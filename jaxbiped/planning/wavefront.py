@@ -14,7 +14,7 @@ from jaxbiped.planning.costs import DIRECTIONS
 DI, DJ = ([int(d) for d in column] for column in DIRECTIONS.T)
 
 
-def settle(edges, goal_ij):
+def solve_edges(edges, goal_ij):
     """(cost [B, H, W] float32, rounds until nothing changed [B], whether the last changed nothing [B]); float64 sums.
 
     Every round settles one more cell of each least path at least, so that `most_rounds` always do.

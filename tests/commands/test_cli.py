@@ -36,15 +36,28 @@ def refused(capsys, *argv: str) -> str:
     ("argv", "said"),
     [
         (["walk"], ["must be one of " + ", ".join(cli.COMMANDS), "walk"]),
-        (["run"], ["Missing", "PATH"]),
-        (["run", SCENE, "--speed", "3"], ["Unrecognized", "--speed"]),
+        (["run"], ["PATH: must be given; `jaxbiped run --help` lists"]),
+        (["run", SCENE, "--strateg", "full"], ["--strateg: is no option of jaxbiped run; did you mean --strategy?"]),
+        (["run", SCENE, "again", "3"], ["again: is one word too many; `jaxbiped run --help` lists"]),
+        (
+            ["run", SCENE, "--executor", "feet"],
+            ["--executor: must be one of kinematic, sampled, native, mjx (got 'feet')"],
+        ),
+        (["stereo", "left.png"], ["RIGHT, --camera FILE: must be given"]),
+        (["plan", "a.map", "--start", "1"], ["--start: must be 2 numbers (got 1)"]),
+        (["plan", "a.map", "--goal", "a", "b"], ["--goal: must be 2 numbers (got a b)"]),
+        (["classify", "a.ply", "--up", "0", "0"], ["--up: must be 3 numbers (got 0 0)"]),
+        (["classify", "a.ply", "--pitch", "nan"], ["--pitch: must be a finite number (got nan)"]),
+        (["compare", "--families"], ["--families: must have at least 1 item (got ())"]),
+        (["sweep", "--no-such"], ["options: cannot be used; `jaxbiped sweep --help` lists", "--no-such"]),
+        (["run", SCENE, "--speed", "3"], ["--speed: is no option of jaxbiped run; did you mean --seed?"]),
         (["run", SCENE, "--strategy", "brave"], ["--strategy", "brave", "floor_only"]),
         (["run", SCENE, "--costs.c1", "-4"], ["--costs.c1", "greater than or equal to 0", "-4"]),
         (["run", SCENE, "--costs.c1", "nan"], ["--costs.c1", "finite", "nan"]),
         (["run", SCENE, "--costs.c1", "cheap"], ["--costs.c1: must be a number (got 'cheap')"]),
         (["run", SCENE, "--camera.width", "wide"], ["--camera.width: must be a whole number (got 'wide')"]),
         (["run", SCENE, "--preset", "best"], ["--preset: must be one of ideal, rendered, real or a .toml file"]),
-        (["run", SCENE, "--preset"], ["Missing value", "--preset"]),
+        (["run", SCENE, "--preset"], ["--preset: must be given a value"]),
         (["run", SCENE, "--seed", "-1"], ["--seed", "greater than or equal to 0"]),
         (["run", SCENE, "--pitch", "0.03"], ["pitch", "must divide", "0.03"]),
         (["run", SCENE, "--robot.standing", "0.2"], ["--robot", "must rise"]),
@@ -263,3 +276,28 @@ def test_a_sensor_file_is_a_preset(here, parsed, capsys):
     line = refused(capsys, "run", SCENE, "--preset", "best")
     assert "preset" in line and "ideal, rendered, real or a .toml file" in line and line.count("best") == 1
     assert "no such file" in refused(capsys, "run", SCENE, "--preset", "nowhere.toml")
+
+
+NASTY = [
+    *(["--no-such"], ["--no-such=3"], ["--out"], ["--seed", "abc"], ["--seed="], ["--seed", "-1"], ["--seed", "nan"]),
+    *(["a", "b", "c", "d"], ["--out", "a", "b"], ["--robot.step", "x"], ["--pitch", "-1"], ["--executor", "feet"]),
+]
+OF_LIBRARIES = (
+    "Unrecognized",
+    "Expected",
+    "Missing",
+    "Error parsing",
+    "Input should",
+    "type=",
+    "tyro",
+    "pydantic",
+    "np.",
+)
+
+
+@pytest.mark.parametrize("command", cli.COMMANDS)
+def test_no_text_of_a_library_is_in_a_message(here, capsys, command):
+    """Whatever is wrong with the options: the field, and what is allowed, in our words."""
+    for words in NASTY:
+        said = refused(capsys, command, *words)
+        assert not [text for text in OF_LIBRARIES if text in said] and ": " in said.removeprefix("jaxbiped: "), said

@@ -73,7 +73,7 @@ def test_two_folders(here, capsys):
         (["r", "--plan-power", "--wanted-difference", "2"], ["wanted-difference", "below 1"]),
         (["r", "--power", "1"], ["--power", "less than 1"]),
         (["r", "--level", "95"], ["--level", "less than 1"]),
-        (["r", "--arenas", "10"], ["Unrecognized", "--arenas"]),
+        (["r", "--arenas", "10"], ["--arenas: is no option"]),
         (["r", "--out", "swept"], ["out", "does not exist yet", "swept"]),
     ],
 )

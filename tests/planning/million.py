@@ -1,5 +1,7 @@
 """A million maps of nasty structure against scipy's Dijkstra: `python -m tests.planning.million [COUNT]`, some minutes.
 
+`make test-all` runs it after the tests.
+
 The same generator as of `test_adversarial.py`, with seeds of its own. It prints the greatest relative error of every
 method, and ends with status 1 where a field is further off than `RELATIVE`, or does not converge.
 """

@@ -1,6 +1,5 @@
 """Edge costs and fields against plain loops and scipy's Dijkstra."""
 
-import importlib
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -14,9 +13,9 @@ from jax import lax
 from jaxbiped import planning
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning.compiled import solvers
 from tests.planning import oracle
 
-settle = importlib.import_module("jaxbiped.planning.compiled.settle")
 H, W, B = 9, 11, 150  # 150: more than one chunk, and not a multiple of it
 SEEN = range(0, B, 6)  # arenas compared with the plain loops, which take most of the time
 METHODS = ["line_sweep", "dijkstra", "wavefront"]
@@ -200,7 +199,7 @@ def test_threads_that_begin_together_compile_a_kernel_once(monkeypatch):
         time.sleep(0.1)
         return method, 1
 
-    monkeypatch.setattr(settle, "registered", slow)
+    monkeypatch.setattr(solvers, "registered", slow)
     with ThreadPoolExecutor(4) as pool:
-        found = set(pool.map(lambda _: settle.target("line_sweep"), range(4)))
+        found = set(pool.map(lambda _: solvers.target("line_sweep"), range(4)))
     assert found == {("line_sweep", 1)} and calls == ["line_sweep"]

@@ -1,7 +1,5 @@
 """`converged` is a proof: a kernel that stops too early is seen, whichever it is."""
 
-import importlib
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -10,10 +8,9 @@ from numba import njit
 
 from jaxbiped import planning
 from jaxbiped.planning import wavefront
-from jaxbiped.planning.compiled import LANES, foreign, grids, heading, heading_sweep, line_sweep
+from jaxbiped.planning.compiled import LANES, foreign, grids, heading, heading_sweep, line_sweep, solvers
 from jaxbiped.planning.costs import Costs, Rules, tables
 
-compiled_settle = importlib.import_module("jaxbiped.planning.compiled.settle")  # a function has its name, too
 H, W = 5, 7
 CLASSES = np.ones((LANES, H, W), np.int8)
 GOALS = np.repeat([[2, 3]], LANES, 0).astype(np.int32)
@@ -46,8 +43,8 @@ def test_a_kernel_of_grids_that_stops_early_does_not_converge():
 def test_a_kernel_of_edges_that_stops_early_does_not_converge(lanes, monkeypatch):
     """`lanes`: of Dijkstra's method, and of line sweeps."""
     name = f"test_give_up_{lanes}"
-    foreign.register(name, compiled_settle.solver(give_up, lanes))
-    monkeypatch.setattr(compiled_settle, "registered", lambda kernel: (name, lanes))
+    foreign.register(name, solvers.solver(give_up, lanes))
+    monkeypatch.setattr(solvers, "registered", lambda kernel: (name, lanes))
     edges = planning.edge_costs(CLASSES, 0 * CLASSES)
     jax.clear_caches()
     out = planning.cost_to_go(edges, GOALS, method="line_sweep")

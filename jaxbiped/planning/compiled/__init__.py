@@ -1,7 +1,4 @@
-"""Planners compiled by Numba for a CPU, as functions of JAX arrays and of NumPy arrays.
-
-Numba loads at the first use.
-"""
+"""Planners compiled by Numba for a CPU, as functions of JAX and of NumPy arrays. Numba loads at the first use."""
 
 from jaxbiped.core.lazy_package import lazy_package
 
@@ -9,8 +6,8 @@ lazy_package(
     __name__,
     {
         "crossing": "crossing_faces",
-        "heading": "settle_headings",
+        "heading": "solve_headings",
         "names": "LANES METHODS",
-        "settle": "aligned settle settle_arrays settle_grids",
+        "solvers": "aligned solve_arrays solve_edges solve_grids",
     },
 )

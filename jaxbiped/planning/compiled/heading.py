@@ -95,7 +95,7 @@ def registered(method: str) -> tuple[str, int]:
     return name, 1 if method == "dijkstra" else sweep.LANES
 
 
-def settle_headings(time, face, turn, goal_ij, method: str):
+def solve_headings(time, face, turn, goal_ij, method: str):
     """Least time [B, 8, H, W] float32 from each heading and cell to the goal, in any heading there, summed as float64;
     and whether it is settled, bool [B].
 

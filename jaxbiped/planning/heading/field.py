@@ -108,7 +108,7 @@ def solve(classes, levels, times: Times, rules: Rules, goal_ij, extra=None, *, p
         if method == "wavefront":
             cost, proven = wavefront(moves.time, moves.face, times.turn, goal_ij)
         else:
-            cost, proven = compiled.settle_headings(moves.time, moves.face, times.turn, goal_ij, method)
+            cost, proven = compiled.solve_headings(moves.time, moves.face, times.turn, goal_ij, method)
         return HeadingField(cost, moves, times.turn, valid & proven)
 
 

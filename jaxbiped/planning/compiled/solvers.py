@@ -86,7 +86,7 @@ def registered(kernel: str) -> tuple[str, int]:
     return name, lanes
 
 
-def settle(edges, goal_ij, method: str):
+def solve_edges(edges, goal_ij, method: str):
     """(cost [B, H, W] float32, steps until nothing changed [B], whether it is settled [B]), summed as float64.
 
     Args:
@@ -112,8 +112,8 @@ def settle(edges, goal_ij, method: str):
     return cost[:batch], steps[:batch], settled[:batch]
 
 
-def settle_grids(tables, classes, levels, goal_ij):
-    """`settle` by line sweeps, straight from grids, without ever holding the edges of more than a few arenas.
+def solve_grids(tables, classes, levels, goal_ij):
+    """`solve_edges` by line sweeps, straight from grids, without ever holding the edges of more than a few arenas.
 
     Args:
       tables: of each arena: the kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and
@@ -140,8 +140,8 @@ def settle_grids(tables, classes, levels, goal_ij):
     return cost[:batch], steps[:batch], settled[:batch]
 
 
-def settle_arrays(tables, classes, levels, goal_ij, cost, steps, settled) -> None:
-    """`settle_grids` of NumPy arrays, of no fewer arenas than lanes; results go into `cost`, `steps` and `settled`.
+def solve_arrays(tables, classes, levels, goal_ij, cost, steps, settled) -> None:
+    """`solve_grids` of NumPy arrays, of no fewer arenas than lanes; results go into `cost`, `steps` and `settled`.
 
     From other threads it runs at the same time.
     """
