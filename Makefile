@@ -4,7 +4,21 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: install compare test test-all lint bench clean
+.PHONY: install compare quick test test-all lint bench clean
+
+# The quickest tests of every room: a minute on two cores.
+QUICK := $(addprefix tests/, test_config.py test_errors.py test_imports.py core \
+  $(addprefix arenas/, test_scene.py) \
+  $(addprefix mapping/, test_class_grid.py test_grid.py test_leveling.py test_moving_ai.py test_ros_map.py) \
+  $(addprefix planning/, test_path.py) \
+  $(addprefix sensing/, test_cloud.py test_configs.py test_motion.py test_noise.py) \
+  $(addprefix sensing/stereo/, test_calibration.py test_images.py test_matching.py test_points.py test_rectify.py) \
+  $(addprefix motion/, test_edge.py test_gait.py test_primitives.py) \
+  $(addprefix physics/, test_inputs.py) \
+  $(addprefix mission/, test_footwork.py test_recording.py test_scenes.py) \
+  $(addprefix study/, test_clock.py test_pilot.py test_pointwise.py test_schema.py test_store.py test_sweep.py) \
+  $(addprefix report/, test_measured.py test_viewer_missions.py) \
+  $(addprefix commands/, test_cache.py test_reproduce.py test_view.py))
 
 $(VENV)/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; v = sys.version_info; sys.exit(None if v >= (3, 11) else "jaxbiped needs Python 3.11 or later; this is %d.%d. Set PYTHON=python3.12, say." % v[:2])'
@@ -18,6 +32,9 @@ install: $(VENV)/installed
 compare: install
 	$(BIN)/jaxbiped compare configs/studies/compare.toml
 
+quick: install
+	$(BIN)/python -m pytest -m "not slow" -n 2 $(QUICK)
+
 test: install
 	$(BIN)/python -m pytest -m "not slow" -n 2
 
@@ -30,6 +47,7 @@ lint: install
 	$(BIN)/ruff format --check .
 
 bench: install
+	$(BIN)/python sweeps/bench_startup.py
 	$(BIN)/python sweeps/bench_planning.py
 	$(BIN)/python sweeps/bench_mapping.py
 	$(BIN)/python sweeps/bench_mission.py

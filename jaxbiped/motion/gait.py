@@ -16,7 +16,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
-from scipy.interpolate import CubicSpline
 
 from jaxbiped.errors import InputError
 from jaxbiped.motion.biped import JOINT_NAMES, RobotModelConfig
@@ -174,6 +173,8 @@ def tabulate(
     request: Request, robot: RobotModelConfig, names: list[str], durations: np.ndarray, motion: Motion
 ) -> PrimitiveTable:
     """Check a movement against the robot's limits and sample it at `TIMESTEP`."""
+    from scipy.interpolate import CubicSpline
+
     time = motion.time.astype(np.float64)
     _check_reach(request, motion)
     rows = max(1, round(time[-1] / TIMESTEP))

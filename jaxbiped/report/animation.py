@@ -72,6 +72,16 @@ class Scene:
         self.heading = self.ax.set_title(" ", fontsize=10)
         self.canvas.draw()
         self.figure.set_layout_engine("none")  # finding the layout takes longer than drawing
+        self.inside = [
+            artist
+            for ax in self.figure.axes
+            for artist in sorted(ax.get_children(), key=lambda artist: artist.zorder)
+            if artist not in (ax.patch, ax.xaxis, ax.yaxis)
+        ]
+        for artist in self.inside:
+            artist.set_animated(True)  # left out of what is drawn once: legend and ticks, which take most of the time
+        self.canvas.draw()
+        self.around = self.canvas.copy_from_bbox(self.figure.bbox)
 
     @property
     def extent(self) -> tuple[float, ...]:
@@ -145,7 +155,9 @@ class Scene:
     def pixels(self, t: int) -> Image.Image:
         """The figure at moment `t`."""
         self.show(t)
-        self.canvas.draw()
+        self.canvas.restore_region(self.around)
+        for artist in self.inside:
+            artist.draw(self.canvas.get_renderer())
         return Image.fromarray(np.asarray(self.canvas.buffer_rgba())[..., :3])
 
 

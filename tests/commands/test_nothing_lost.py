@@ -85,4 +85,4 @@ def hidden():
 
 
 def test_every_command_that_stores_something_is_here():
-    assert {case.argv[0] for case in CASES.values()} | {"view"} == set(cli.COMMANDS)
+    assert {case.argv[0] for case in CASES.values()} | {"view", "cache"} == set(cli.COMMANDS)

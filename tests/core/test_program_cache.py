@@ -23,9 +23,14 @@ HIT, MISS = "/jax/compilation_cache/cache_hits", "/jax/compilation_cache/cache_m
 def seen():
     """Events of JAX's cache."""
     events = []
-    jax.monitoring.register_event_listener(lambda name, **_: events.append(name) if name in (HIT, MISS) else None)
+
+    def note(name, **_):
+        if name in (HIT, MISS):
+            events.append(name)
+
+    jax.monitoring.register_event_listener(note)
     yield events
-    jax.monitoring.clear_event_listeners()
+    jax.monitoring.unregister_event_listener(note)
 
 
 @pytest.fixture

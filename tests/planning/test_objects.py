@@ -129,10 +129,14 @@ def test_many_at_once(folder):
 
 PROGRAM = """
 import sys
+import jax
 import numpy as np
 from jaxbiped import planning
 from jaxbiped.planning.compiled import foreign
 
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+missed = []
+jax.monitoring.register_event_listener(lambda name, **_: missed.append(name) if name.endswith("cache_misses") else None)
 classes, levels = np.ones((1, 9, 12), np.int8), np.zeros((1, 9, 12), np.int8)
 classes[0, 3, 2:9], classes[0, 5:7, 4:8], levels[0, 5:7, 4:8] = 4, 2, 1
 for method in sys.argv[1:]:
@@ -145,14 +149,53 @@ for method in sys.argv[1:]:
     headings = planning.heading_field(classes, levels, goal_ij=[[7, 3]], method=method)
     print(bool(headings.converged.all()), np.asarray(headings.cost).tobytes().hex())
 print(many.cost[39].tobytes().hex())
-print("compiled", len(foreign.HANDLERS), "of", len(foreign.ADDRESSES))
+print("compiled", len(foreign.HANDLERS), "of", len(foreign.ADDRESSES), "and", len(missed))
 """
 
 
-def test_the_next_process_compiles_no_kernel():
+def test_the_next_process_compiles_no_kernel_and_no_program():
     """Of those of the suite, which all processes share."""
     words = [sys.executable, "-c", PROGRAM, "line_sweep", "dijkstra"]
     first, second = (
         subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines() for _ in range(2)
     )
-    assert second[-1] == "compiled 0 of 6" and first[-1].endswith("of 6") and first[:-1] == second[:-1]
+    assert second[-1] == "compiled 0 of 6 and 0" and " of 6 and " in first[-1] and first[:-1] == second[:-1]
+
+
+CHANGED = """
+import sys
+import jax, jax.numpy as jnp, numpy as np
+from numba import njit
+from jaxbiped.jax_settings import own_settings
+from jaxbiped.planning.compiled import foreign
+
+factor = int(sys.argv[1])
+
+@njit
+def scaled(arguments, count, results):
+    size = foreign.shape(arguments, 0)[0]
+    given = foreign.array(arguments, 0, size, np.float32)
+    foreign.array(results, 0, size, np.float32)[:] = factor * given
+
+foreign.register("jaxbiped_test_scaled", scaled)
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
+hits = []
+jax.monitoring.register_event_duration_secs_listener(
+    lambda name, _, **more: hits.append(name) if name.endswith("compile_time_saved_sec") else None
+)
+call = jax.jit(lambda x: jax.ffi.ffi_call("jaxbiped_test_scaled", jax.ShapeDtypeStruct((4,), jnp.float32))(x))
+found = call(np.arange(4, dtype=np.float32))
+print(found.tolist(), len(hits))
+"""
+
+
+def test_an_executable_from_the_disk_calls_the_kernels_of_its_own_process(tmp_path):
+    """After a change of a kernel's code alone the program is the same, and must not bring the old kernel back."""
+    both = os.environ | {VARIABLE: str(tmp_path)}
+    said = [
+        subprocess.run(
+            [sys.executable, "-c", CHANGED, factor], env=both, check=True, stdout=subprocess.PIPE, text=True
+        ).stdout
+        for factor in ("2", "2", "3")
+    ]
+    assert said == ["[0.0, 2.0, 4.0, 6.0] 0\n", "[0.0, 2.0, 4.0, 6.0] 1\n", "[0.0, 3.0, 6.0, 9.0] 1\n"]

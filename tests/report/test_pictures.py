@@ -144,6 +144,29 @@ def test_a_film_shows_what_the_robot_sees_beside_the_map(tmp_path):
         replace(plain, pictures=shown[:2])
 
 
+# Greatest difference in grey levels, and share of the pixels: ticks are drawn before the frame that they touch.
+TICKS = 32, 1e-4
+
+
+@pytest.mark.parametrize("seeing", [False, True])
+def test_frames_are_as_if_all_of_the_figure_were_drawn_anew(seeing):
+    log = mission(5)
+    if seeing:
+        rng = np.random.default_rng(0)
+        images = rng.integers(0, 255, (5, 12, 16, 3), np.uint8), rng.uniform(0, 60, (5, 12, 16)).astype(np.float32)
+        log = replace(log, pictures=tuple(Picture(*each) for each in zip(*images, strict=True)))
+    scene = animation.Scene(log, "a film", 60)
+    frames = [np.asarray(scene.pixels(t)).copy() for t in range(5)]
+    for artist in scene.inside:
+        artist.set_animated(False)
+    for t, frame in enumerate(frames):
+        scene.show(t)
+        scene.canvas.draw()
+        apart = np.abs(frame.astype(int) - np.asarray(scene.canvas.buffer_rgba())[..., :3])
+        assert apart.max() <= TICKS[0] and np.count_nonzero(apart) <= TICKS[1] * apart.size
+    assert len({frame.tobytes() for frame in frames}) == 5
+
+
 def test_thirty_frames_take_seconds_and_little_room(tmp_path):
     start = time.perf_counter()
     animation.save_gif(tmp_path / "m.gif", mission(30, 28, 9))
