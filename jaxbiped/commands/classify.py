@@ -1,4 +1,4 @@
-"""`jaxbiped classify`: a map of a point cloud."""
+"""`jaxbiped classify`: a map of a point cloud, or of an elevation map."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import tyro
 from pydantic import Field
 
-from jaxbiped.commands.charting import ChartArgs, Metres, chart, say_map, write_chart, write_json
+from jaxbiped.commands.charting import ChartArgs, Metres, chart, say_cells, write_chart, write_json
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
@@ -20,23 +20,35 @@ from jaxbiped.sensing import cloud as clouds
 from jaxbiped.sensing.cloud import Cloud
 from jaxbiped.terminal import legible
 
+Pair = Annotated[tuple[Metres, Metres] | None, tyro.conf.arg(metavar="LOW HIGH")]
 Vector = Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y Z")]
 
 
 class ClassifyArgs(ChartArgs):
-    """Map a point cloud: 3D grid and class grid, with pictures."""
+    """Map a point cloud or, with --heightmap, an elevation map: class grid and levels, with pictures."""
 
-    cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="CLOUD")]
-    """The cloud, .npz (points [N, 3], or x, y, z), .npy, .ply or .pcd."""
+    cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
+    """The cloud, .npz (points [N, 3], or x, y, z), .npy, .ply or .pcd. The elevation map, .npz (heights [P, Q] and
+    pitch, metres), .png or .tif (grey), or .asc (Esri)."""
+    heightmap: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """The file is an elevation map. Its levels are steps of the robot, and holes in it are unmeasured."""
+    cell: Annotated[Annotated[float, Field(gt=0, le=1e6)] | None, tyro.conf.arg(metavar="FLOAT")] = None
+    """[m] A pixel of an elevation map that is a picture."""
+    range: Pair = None
+    """[m] Heights of the darkest and the brightest value there can be in such a picture."""
+    hole: Annotated[float | None, tyro.conf.arg(metavar="FLOAT")] = None
+    """Value of pixels of such a picture that were not measured."""
     scale: Annotated[float, Field(gt=0, le=1e4)] = 1.0
-    """[m] One unit of the cloud; 0.001 for millimetres."""
+    """[m] One unit of the cloud; 0.001 for millimetres. Of an elevation map the factor of all three axes, which brings
+    a building to the robot's size."""
     up: Vector = None
     """The direction against gravity in the cloud's frame. Default: found, z or else y or -y within 30 degrees. Must be
     given where a larger plane than that floor is tilted by more."""
     tilt: Annotated[float, Field(ge=0, le=60)] = 10.0
     """[deg] by which --up may be off; 0 to take it as it is."""
     floor: Annotated[Metres | None, tyro.conf.arg(metavar="FLOAT")] = None
-    """[m] Height of the floor along --up, which is then taken as it is. Default: found."""
+    """[m] Height of the floor along --up, which is then taken as it is. With --heightmap, height of level 0, after
+    --scale. Default: found."""
 
 
 def main(args: ClassifyArgs) -> int:
@@ -51,6 +63,10 @@ def main(args: ClassifyArgs) -> int:
     """
     out = args.out or Path("results") / f"classify-{config_hash(args.model_copy(update={'out': None}))}"
     refuse_existing(out)
+    if args.heightmap:
+        from jaxbiped.commands import heightmap
+
+        return heightmap.main(args, out)
     check_options(args)
     start = time.perf_counter()
     cloud = clouds.load(args.cloud, args.scale)
@@ -77,13 +93,16 @@ def main(args: ClassifyArgs) -> int:
     if cloud.origin.any():
         print(f"origin    far from 0: computed from {', '.join(f'{v:.0f}' for v in cloud.origin)} m")
     print(f"floor     {say_floor(upright, cloud)}")
-    print(f"map       {say_map(made)}, in {seconds:.1f} s")
+    print(f"map       {say_cells(made.grid)}, in {seconds:.1f} s")
     print(f"written   {out}: {', '.join([*names, 'classify.json'])}")
     return 0
 
 
 def check_options(args: ClassifyArgs) -> None:
     """Raise `InputError` unless the options go together."""
+    for name in ("cell", "range", "hole"):
+        if getattr(args, name) is not None:
+            raise InputError("goes with --heightmap only", field=name, value=getattr(args, name))
     if args.floor is not None and args.up is None:
         raise InputError("goes with --up only", field="floor", value=args.floor)
     if args.up is not None and not 0 < math.hypot(*args.up) < math.inf:

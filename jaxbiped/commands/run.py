@@ -14,6 +14,7 @@ import pydantic
 import tyro
 
 from jaxbiped.arenas import load_scene, scene_warnings
+from jaxbiped.arenas.ground import WITH_TERRAIN, refuse_terrain
 from jaxbiped.config import Model, config_hash
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.eyes import eyes_for
@@ -56,7 +57,10 @@ def main(args: RunArgs) -> int:
     out = args.out or Path("results") / f"run-{args.scene.stem}-{args.strategy}-{identity}"
     refuse_existing(out)
     name, arena = load_scene(args.scene)
-    static = program(args.mission, tuple(round(float(v), 6) for v in arena.size_xy))
+    for kind, choice in (("sensor", args.mission.sensor), ("executor", args.mission.executor)):
+        if choice not in WITH_TERRAIN[kind]:
+            refuse_terrain(arena, f"{kind} {choice}")
+    static = program(args.mission, tuple(round(float(v), 6) for v in arena.size_xy), arena.terrain)
     for text in scene_warnings(arena, args.mission.robot, static.spec.level_height):
         print(f"jaxbiped: warning: {args.scene}: {text}", file=sys.stderr)
     play = run_logged

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.errors import InputError
@@ -239,6 +240,13 @@ def triangle_height(
     return low + jnp.where(
         lower, along * (right - low) + across * (high - right), across * (up - low) + along * (high - up)
     )
+
+
+def height_range(field: HeightField) -> tuple[float, float]:
+    """Lowest and highest vertex [m] of a field, on the host; 0 where all are holes. Its heights are concrete."""
+    heights = np.asarray(field.heights)
+    known = heights[np.isfinite(heights)]
+    return (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
 
 
 def on_lattice(

@@ -5,7 +5,7 @@ from jaxbiped.mapping.grid import Body, Cell, GridSpec
 from jaxbiped.mapping.gridmap import GridMap, classify, empty, ground_height, mark_footprint, update
 from jaxbiped.mapping.leveling import level_view
 from jaxbiped.mapping.params import MapConfig, MapParams
-from jaxbiped.mapping.truth import truth_grid
+from jaxbiped.mapping.truth import terrain_grid, truth_grid
 
 __all__ = [
     "Body",
@@ -20,6 +20,7 @@ __all__ = [
     "ground_height",
     "level_view",
     "mark_footprint",
+    "terrain_grid",
     "truth_grid",
     "update",
 ]

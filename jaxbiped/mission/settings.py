@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,7 +14,9 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
+from jaxbiped.geometry.height_field import HeightField, height_range
 from jaxbiped.mapping import Body, GridSpec, MapConfig, MapParams
+from jaxbiped.mapping.grid import MOST_GROUNDS
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.library import Library, load_library
 from jaxbiped.mission.strategies import Strategy, strategy
@@ -30,6 +32,7 @@ from jaxbiped.sensing.presets import PRESETS, sensor_preset
 
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
+HEADROOM = 12  # levels above that of the highest ground that a map holds: those within a standing robot of 38.5 cm
 SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinematic`: a walking biped sways, and its
 # stereo camera, as wide as the body, sweeps 12 cm to either side
 BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
@@ -155,9 +158,20 @@ class MissionConfig(Model):
         sensor_preset(name)
         return name
 
-    def grid(self, size_xy: tuple[float, float]) -> GridSpec:
-        """The static grid of an area [m]; InputError when the pitch does not divide it."""
-        return GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch, max_radius=MAX_RADIUS)
+    def grid(self, size_xy: tuple[float, float], heights: tuple[float, float] = (0.0, 0.0)) -> GridSpec:
+        """The static grid of an area [m]; InputError when the pitch does not divide it.
+
+        Args:
+          heights: [m] lowest and highest ground of its terrain. It may be stood on in as many levels as there are,
+            at most `MOST_GROUNDS`, and above the highest of them there is room for the robot's head; 32 levels hold
+            both up to 20 levels of ground (57 cm).
+        """
+        spec = GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch, max_radius=MAX_RADIUS)
+        low, high = (round(height / spec.level_height) for height in heights)
+        grounds = min(max(spec.ground_levels, high + 1), MOST_GROUNDS)
+        lowest = max(min(spec.lowest, low - 1), -8)
+        above = max(spec.levels + spec.lowest, min(grounds + HEADROOM, 32))
+        return replace(spec, lowest=lowest, levels=above - lowest, ground_levels=grounds)
 
     def settings(self, strategy_name: str) -> Settings:
         """The traced part, for one strategy."""
@@ -250,11 +264,12 @@ class Program:
     fading: bool = False  # the map forgets what has moved
 
 
-def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
-    """The static part of a config for arenas of one size [m]."""
+def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> Program:
+    """The static part of a config for arenas of one size [m], and with such terrain, whose heights are concrete."""
+    heights = (0.0, 0.0) if terrain is None else height_range(terrain)
     footing = config.executor != "kinematic" if config.foot_placement is None else config.foot_placement
     return Program(
-        config.grid(size_xy),
+        config.grid(size_xy, heights),
         config.camera.image,
         config.sensor,
         config.executor,
