@@ -27,7 +27,7 @@ COMMANDS = {
     "run": ("run", "RunArgs", "run one mission in a scene, with pictures", False),
     "plan": ("plan", "PlanArgs", "plan on a map that you have: Moving AI, ROS map_server, class grid", False),
     "stereo": ("stereo", "StereoArgs", "map what a real stereo pair shows", False),
-    "classify": ("classify", "ClassifyArgs", "map a point cloud", False),
+    "classify": ("classify", "ClassifyArgs", "map a point cloud or an elevation map", False),
     "primitives": ("primitives", "PrimitivesArgs", "verify the motion primitives in simulation", False),
     "tune": ("tune", "TuneArgs", "tune the costs on random arenas, and judge them on others", True),
     "fit-sensor": ("fit_sensor", "FitSensorArgs", "fit the noise of the ray-cast sensor to rendered pairs", False),

@@ -17,10 +17,14 @@ class InputError(ValueError):
     """
 
     def __init__(self, message: str, *, file: str | Path | None = None, field: str | None = None, value: object = None):
-        self.file, self.field, self.value = file, field, value
+        self.message, self.file, self.field, self.value = message, file, field, value
         place = ": ".join(str(part) for part in (file, field) if part is not None)
         got = f" (got {_short(value)})" if value is not None else ""
         super().__init__(" ".join(f"{place + ': ' if place else ''}{message}{got}".split()))
+
+    def within(self, file: str | Path) -> InputError:
+        """The same of a value that came from a file."""
+        return InputError(self.message, file=file, field=self.field, value=self.value)
 
 
 def _short(value: object, limit: int = 200) -> str:

@@ -9,6 +9,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.arenas.movers import Movers
 from jaxbiped.geometry.boxes import Boxes
+from jaxbiped.geometry.height_field import HeightField
 
 CIRCLE, SQUARE = 0, 1  # kinds of landmark
 DISC_RADIUS, SQUARE_SIDE = 0.075, 0.05  # [m] (paper, 3.1)
@@ -29,7 +30,10 @@ class Landmarks:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Arena:
-    """One arena: boxes, landmarks, start and goal. The floor is the rectangle [0, size_x] x [0, size_y] at z = 0."""
+    """One arena: boxes, terrain, landmarks, start and goal.
+
+    The floor is the rectangle [0, size_x] x [0, size_y] at z = 0, but where the terrain lies, which is there instead.
+    """
 
     size_xy: Float[Array, "*B 2"]  # [m]
     boxes: Boxes
@@ -40,3 +44,4 @@ class Arena:
     family: Int[Array, "*B"]  # index into `families.KNOWN`; -1 for a scene written by hand
     difficulty: Float[Array, "*B"]  # 0 (easy) to 1 (hard)
     movers: Movers | None = None  # None: all boxes stand
+    terrain: HeightField | None = None  # None: flat floor. In a hole there is no ground

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, Protocol, runtime_checkable
 
@@ -12,10 +13,12 @@ import pydantic
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
 from jaxbiped.arenas.families import LANDMARKS_X, MAX_BOXES
+from jaxbiped.arenas.ground import HOLE, rises_near, terrain_height
 from jaxbiped.config import Model, load
 from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes
+from jaxbiped.geometry.height_field import HeightField
 
 Metres = Annotated[float, pydantic.Field(ge=-1000.0, le=1000.0)]
 Positive = Annotated[float, pydantic.Field(gt=0.0, le=1000.0)]
@@ -24,6 +27,7 @@ Fraction = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Point = tuple[Metres, Metres]
 
 # Of the robot of the paper: no box between a step above the ground and its head may be nearer to the start or the goal.
+LOWEST, HIGHEST = -0.2, 0.69  # [m] of ground that a robot may start on or go to: the levels that a map has
 START_CLEARANCE, STEP, STANDING, SQUATTING = 0.08, 0.03, 0.385, 0.34  # [m]
 
 
@@ -61,6 +65,25 @@ class LandmarkConfig(Model):
     """[rad]"""
 
 
+class TerrainConfig(Model):
+    """The ground as an elevation map; where it does not reach, the floor lies at 0."""
+
+    file: Annotated[str, pydantic.Field(min_length=1)]
+    """The map (`jaxbiped.formats.elevation`), absolute or from the folder of the scene."""
+    cell: Positive | None = None
+    """[m] a pixel of a picture."""
+    range: tuple[Metres, Metres] | None = None
+    """[m] heights of the darkest and the brightest value there can be in a picture."""
+    hole: float | None = None
+    """Value of pixels of a picture that were not measured. There is no ground there."""
+    scale: Positive = 1.0
+    """Factor of all three axes: brings a building to the robot's size."""
+    origin: Point | None = None
+    """[m] place of the first height, that of least x and y; by default the file's own."""
+    floor: Annotated[float, pydantic.Field(ge=-1e4, le=1e4)] = 0.0
+    """[m] height in the map, after `scale`, that is the arena's 0."""
+
+
 class SceneConfig(Model):
     """One arena."""
 
@@ -74,6 +97,7 @@ class SceneConfig(Model):
     floor_contrast: Fraction = 1.0
     boxes: tuple[BoxConfig, ...] = ()
     landmarks: tuple[LandmarkConfig, ...] = ()
+    terrain: TerrainConfig | None = None
 
 
 @checked()
@@ -82,16 +106,52 @@ def load_scene(path: str | Path) -> tuple[str, Arena]:
 
     Raises:
       InputError: what is wrong with the file, first thing first; start, goal or a box outside the area; start or
-        goal inside an obstacle.
+        goal inside an obstacle; a terrain that cannot be read, or start or goal where it has no ground to stand on.
     """
     scene = load(SceneConfig, path)
-    _check(scene, path)
-    return scene.name, to_arena(scene)
+    try:
+        terrain = to_terrain(scene, Path(path).parent)
+    except InputError as error:
+        if error.file is not None:  # it is of the map
+            raise
+        raise error.within(path) from None
+    _check(scene, path, terrain)
+    return scene.name, replace(to_arena(scene), terrain=terrain)
+
+
+def to_terrain(scene: SceneConfig, folder: Path) -> HeightField | None:
+    """The terrain of a scene in `folder`, cut to its area; None where it has none.
+
+    Raises:
+      InputError: the map cannot be used, or lies beside the area.
+    """
+    from jaxbiped.formats.elevation import load_elevation  # a room beyond this one, which reads files for it
+
+    given = scene.terrain
+    if given is None:
+        return None
+    options = {name: getattr(given, name) for name in ("cell", "range", "hole", "scale")}
+    elevation = load_elevation(folder / given.file, prefix="terrain.", **options)
+    origin = np.array(elevation.origin_xy if given.origin is None else given.origin, float)
+    rows, columns = elevation.heights.shape
+    first = np.floor(-origin / elevation.pitch).astype(int).clip(0)
+    last = np.ceil((np.array(scene.size) - origin) / elevation.pitch).astype(int).clip(max=(columns - 1, rows - 1))
+    if (last <= first).any():
+        wide, deep = elevation.size_xy
+        message = (
+            f"must lay the terrain, {wide:g} x {deep:g} m, into the area of {scene.size[0]:g} x {scene.size[1]:g} m"
+        )
+        raise InputError(message, field="terrain.origin", value=origin)
+    heights = elevation.heights[first[1] : last[1] + 1, first[0] : last[0] + 1]
+    return replace(elevation, heights=heights, origin_xy=origin + first * elevation.pitch).field(given.floor)
 
 
 @checked()
 def to_arena(scene: SceneConfig) -> Arena:
-    """The arena of a scene, padded to at least the slots of a random arena, so that both share compiled programs."""
+    """The arena of a scene without its terrain (see `to_terrain`), with at least the slots of a random arena.
+
+    So both share compiled programs.
+    """
     slots = max(MAX_BOXES, len(scene.boxes))
     rows = np.zeros((8, slots), np.float32)
     for m, box in enumerate(scene.boxes):
@@ -119,7 +179,7 @@ def to_arena(scene: SceneConfig) -> Arena:
     )
 
 
-def _check(scene: SceneConfig, path: str | Path) -> None:
+def _check(scene: SceneConfig, path: str | Path, terrain: HeightField | None) -> None:
     size_x, size_y = scene.size
     for field, (x, y) in (("start", scene.start[:2]), ("goal", scene.goal)):
         if not (0 < x < size_x and 0 < y < size_y):
@@ -143,8 +203,15 @@ def _check(scene: SceneConfig, path: str | Path) -> None:
                 value=list(box.centre),
             )
     for field, point, head in (("start", scene.start[:2], STANDING), ("goal", scene.goal, SQUATTING)):
-        ground = max((box.top for box in scene.boxes if box.bottom == 0 and distance(box, point) == 0), default=0.0)
-        if ground > 2 * STEP:
+        base = base_height(terrain, point)
+        if base == HOLE:
+            raise InputError("must not lie in a hole of the terrain", file=path, field=field, value=list(point))
+        if not LOWEST <= base <= HIGHEST:
+            message = f"must lie on terrain from {LOWEST:g} to {HIGHEST:g} m; terrain.floor moves it up or down"
+            raise InputError(message, file=path, field=field, value=f"{base:.3g} m at {list(point)}")
+        ground = max((box.top for box in scene.boxes if box.bottom == 0 and distance(box, point) == 0), default=base)
+        ground = max(ground, base)
+        if ground > base + 2 * STEP:
             raise InputError("must not lie on an obstacle", file=path, field=field, value=list(point))
         for m, box in enumerate(scene.boxes):
             between = box.top > ground + STEP + 1e-6 and box.bottom < ground + head
@@ -166,14 +233,23 @@ class Measures(Protocol):
 def scene_warnings(arena: Arena, robot: Measures, level_height: float) -> tuple[str, ...]:
     """What a person should know of a scene before this robot walks in it: one line each, first the start.
 
-    The robot starts in an obstacle (`load_scene` refuses only what is one to the robot of the paper), or a box is a
+    The robot starts in an obstacle (`load_scene` refuses only what is one to the robot of the paper, and no terrain
+    that only rises beside it), or a box is a
     trap: higher than the robot's step over what it stands on, and lower than what is an obstacle by its level alone
     (from `level_height` [m] times a half on). Such ground is told from a bump by a few millimetres.
     """
     boxes = [BoxConfig(**box) for box in _rows(arena)]
     x, y = (float(v) for v in arena.start_xyyaw[:2])
-    ground = max((box.top for box in boxes if box.bottom == 0 and distance(box, (x, y)) == 0), default=0.0)
+    base = base_height(arena.terrain, (x, y))
+    ground = max([base, *(box.top for box in boxes if box.bottom == 0 and distance(box, (x, y)) == 0)])
     bears, found = robot.step + robot.step_tolerance, []
+    if arena.terrain is not None:
+        limits = jnp.float32(robot.body_radius), jnp.float32(ground + bears + 1e-6)
+        if bool(rises_near(arena.terrain, jnp.float32(x), jnp.float32(y), *limits)):
+            found.append(
+                f"start: this robot, {robot.body_radius:g} m in radius, starts in terrain more than a step above its "
+                f"ground of {ground:.3g} m (at [{x:g}, {y:g}])"
+            )
     for m, box in enumerate(boxes):
         between = box.top > ground + bears + 1e-6 and box.bottom < ground + robot.standing - 1e-6
         if between and distance(box, (x, y)) < robot.body_radius:
@@ -183,13 +259,20 @@ def scene_warnings(arena: Arena, robot: Measures, level_height: float) -> tuple[
     obstacle = (math.ceil(robot.step / level_height + 0.5 - 1e-9) - 0.5) * level_height
     for m, box in enumerate(boxes):
         under = [b.top for b in boxes if b.bottom == 0 and b.top < box.top and distance(b, box.centre) == 0]
-        rise = box.top - max(under, default=0.0)
+        rise = box.top - max([base_height(arena.terrain, box.centre), *under])
         if box.bottom == 0 and bears + 1e-6 < rise < obstacle - 1e-6:
             found.append(
                 f"boxes.{m}.top: is {rise:g} m high, more than this robot's step of {robot.step:g} m and less than the "
                 f"{obstacle:g} m from which it is an obstacle by its level (got {box.top:g})"
             )
     return tuple(found)
+
+
+def base_height(terrain: HeightField | None, point: tuple[float, float]) -> float:
+    """Height [m] of terrain, or of the floor, at a point (x, y) [m]; `HOLE` in a hole."""
+    if terrain is None:
+        return 0.0
+    return round(float(terrain_height(terrain, *(jnp.float32(value) for value in point))), 6)
 
 
 def _rows(arena: Arena) -> list[dict]:

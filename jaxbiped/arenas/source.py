@@ -16,6 +16,7 @@ from jaxtyping import Array, Int, PRNGKeyArray
 
 from jaxbiped.arenas.arena import Arena, Landmarks
 from jaxbiped.arenas.families import KNOWN, SIZE_X, SIZE_Y, sample
+from jaxbiped.arenas.ground import refuse_terrain
 from jaxbiped.arenas.population import Population
 from jaxbiped.arenas.scene import load_scene
 from jaxbiped.core.code_hash import component_hash
@@ -56,6 +57,7 @@ class Family:
         where = f"family {self.name}"
         if not isinstance(made, Arena):
             raise InputError(f"its generator must return an Arena, not {type(made).__name__}", field=where)
+        refuse_terrain(made, f"a study, by {where}")
         if made.movers is not None:
             raise InputError("its generator returned boxes that move, which only the family traffic has", field=where)
         shapes = {"size_xy": (2,), "start_xyyaw": (3,), "goal_xy": (2,), "floor_contrast": (), "difficulty": ()}
@@ -103,7 +105,7 @@ def scene_family(path: str | Path) -> SceneFamily:
     Raises:
       InputError: what is wrong with the file.
     """
-    load_scene(path)
+    refuse_terrain(load_scene(path)[1], "a study")
     text = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
     return _scene_family(Path(path), text)
 

@@ -29,12 +29,12 @@ def chart(
     return Chart(moved, made.surface, made.spec)
 
 
-def say_map(made: Chart) -> str:
-    """Its size and its cells, for people."""
-    rows, columns = made.grid.shape
-    count = {cell.name.lower(): int((made.grid.classes == cell).sum()) for cell in Cell}
+def say_cells(grid: class_grid.ClassGrid) -> str:
+    """The size of a map and its cells, for people."""
+    rows, columns = grid.shape
+    count = {cell.name.lower(): int((grid.classes == cell).sum()) for cell in Cell}
     cells = ", ".join(f"{number} {name}" for name, number in count.items() if number)
-    return f"{columns} x {rows} cells of {made.grid.pitch:g} m ({cells})"
+    return f"{columns} x {rows} cells of {grid.pitch:g} m ({cells})"
 
 
 def write_chart(

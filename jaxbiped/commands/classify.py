@@ -1,4 +1,4 @@
-"""`jaxbiped classify`: a map of a point cloud."""
+"""`jaxbiped classify`: a map of a point cloud, or of an elevation map."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxbiped.commands.charting import chart, say_map, write_chart, write_json
+from jaxbiped.commands.charting import chart, say_cells, write_chart, write_json
 from jaxbiped.commands.options.classify import ClassifyArgs
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
@@ -31,6 +31,10 @@ def main(args: ClassifyArgs) -> int:
     """
     out = args.out or Path("results") / f"classify-{config_hash(args.model_copy(update={'out': None}))}"
     refuse_existing(out)
+    if args.heightmap:
+        from jaxbiped.commands import heightmap
+
+        return heightmap.main(args, out)
     check_options(args)
     start = time.perf_counter()
     cloud = clouds.load(args.cloud, args.scale)
@@ -57,13 +61,16 @@ def main(args: ClassifyArgs) -> int:
     if cloud.origin.any():
         print(f"origin    far from 0: computed from {', '.join(f'{v:.0f}' for v in cloud.origin)} m")
     print(f"floor     {say_floor(upright, cloud)}")
-    print(f"map       {say_map(made)}, in {seconds:.1f} s")
+    print(f"map       {say_cells(made.grid)}, in {seconds:.1f} s")
     print(f"written   {out}: {', '.join([*names, 'classify.json'])}")
     return 0
 
 
 def check_options(args: ClassifyArgs) -> None:
     """Raise `InputError` unless the options go together."""
+    for name in ("cell", "range", "hole"):
+        if getattr(args, name) is not None:
+            raise InputError("goes with --heightmap only", field=name, value=getattr(args, name))
     if args.floor is not None and args.up is None:
         raise InputError("goes with --up only", field="floor", value=args.floor)
     if args.up is not None and not 0 < math.hypot(*args.up) < math.inf:

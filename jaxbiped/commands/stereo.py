@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from jaxbiped.commands.charting import chart, say_map, write_chart, write_json
+from jaxbiped.commands.charting import chart, say_cells, write_chart, write_json
 from jaxbiped.commands.options.stereo import StereoArgs
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
@@ -102,7 +102,7 @@ def main(args: StereoArgs) -> int:
         f"{math.degrees(pitch):.2f} and rolled {math.degrees(roll):.2f} degrees"
         + (f"; {floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm" if floor else "")
     )
-    print(f"map       {say_map(made)}")
+    print(f"map       {say_cells(made.grid)}")
     print(f"written   {out}: {', '.join(['points.ply', 'disparity.png', *names, 'stereo.json'])}")
     return 0
 

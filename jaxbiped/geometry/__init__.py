@@ -1,4 +1,4 @@
-"""Poses in the plane, upright boxes, and rays that meet them."""
+"""Poses in the plane, upright boxes and height fields, and rays that meet them."""
 
 from jaxbiped.core.lazy_package import lazy_package
 
@@ -6,6 +6,7 @@ lazy_package(
     __name__,
     {
         "boxes": "Boxes ceiling_height covers footprint_extent ground_height plan_distance",
+        "height_field": "HeightField cast_rays on_field surface_height",
         "pose": "Pose to_robot to_world wrap_angle",
         "rays": "cast_boxes",
     },

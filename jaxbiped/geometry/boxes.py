@@ -30,12 +30,15 @@ class Boxes:
     used: Bool[Array, "*B M"]
 
 
-def ground_height(boxes: Boxes, x: Float[Array, "*S"], y: Float[Array, "*S"]) -> Float[Array, "*S"]:
+def ground_height(
+    boxes: Boxes, x: Float[Array, "*S"], y: Float[Array, "*S"], floor: Float[Array, "*S"] | None = None
+) -> Float[Array, "*S"]:
     """Height [m] of the ground at points (x, y) [m] of one arena: the highest top of floor-standing boxes, else 0.
 
-    Edges belong to the box. One arena: the leaves of `boxes` are [M].
+    Edges belong to the box. One arena: the leaves of `boxes` are [M]. With `floor`, the heights [m] of what the boxes
+    stand on or in at these points, the ground is the higher of both.
     """
-    height = jnp.zeros_like(x)
+    height = jnp.zeros_like(x) if floor is None else floor
     for m in range(boxes.x.shape[-1]):
         here = covers(boxes, m, x, y) & ~boxes.overhead[m]
         height = jnp.where(here, jnp.maximum(height, boxes.top[m]), height)

@@ -11,6 +11,6 @@ lazy_package(
         "gridmap": "GridMap classify empty ground_height mark_footprint update",
         "leveling": "level_view",
         "params": "MapParams",
-        "truth": "truth_grid",
+        "truth": "terrain_grid truth_grid",
     },
 )

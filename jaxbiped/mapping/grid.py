@@ -15,6 +15,7 @@ from jaxbiped.core import checks
 from jaxbiped.errors import InputError
 
 EXACT = 2**24  # integers up to here are float32 numbers
+MOST_GROUNDS = 24  # ground levels: 32 fit a mask, and above the highest there is room for a step, and more
 MOST_CELLS = 4_000_000  # of a grid: more than a map of this kind ever has, and what memory holds
 
 
@@ -64,7 +65,7 @@ class GridSpec:
                 raise InputError(f"must divide the area's {name} of {size:g} m", field="pitch", value=self.pitch)
         allowed = {
             "lowest": (-8 <= self.lowest <= 0, "from -8 to 0"),
-            "ground_levels": (1 <= self.ground_levels <= 8, "from 1 to 8"),
+            "ground_levels": (1 <= self.ground_levels <= MOST_GROUNDS, f"from 1 to {MOST_GROUNDS}"),
             "levels": (
                 self.ground_levels < self.levels + self.lowest <= 32,
                 "at most 32 from level 0 up, and more than ground_levels",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
+HEADROOM = 12  # levels above that of the highest ground that a map holds: those within a standing robot of 38.5 cm
 SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinematic`: a walking biped sways, and its
 # stereo camera, as wide as the body, sweeps 12 cm to either side
 BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
@@ -173,11 +175,22 @@ class MissionConfig(Model):
         sensor_preset(name)
         return name
 
-    def grid(self, size_xy: tuple[float, float]) -> GridSpec:
-        """The static grid of an area [m]; InputError when the pitch does not divide it."""
-        from jaxbiped.mapping.grid import GridSpec
+    def grid(self, size_xy: tuple[float, float], heights: tuple[float, float] = (0.0, 0.0)) -> GridSpec:
+        """The static grid of an area [m]; InputError when the pitch does not divide it.
 
-        return GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch, max_radius=MAX_RADIUS)
+        Args:
+          heights: [m] lowest and highest ground of its terrain. It may be stood on in as many levels as there are,
+            at most `MOST_GROUNDS`, and above the highest of them there is room for the robot's head; 32 levels hold
+            both up to 20 levels of ground (57 cm).
+        """
+        from jaxbiped.mapping.grid import MOST_GROUNDS, GridSpec
+
+        spec = GridSpec(size_x=size_xy[0], size_y=size_xy[1], pitch=self.pitch, max_radius=MAX_RADIUS)
+        low, high = (round(height / spec.level_height) for height in heights)
+        grounds = min(max(spec.ground_levels, high + 1), MOST_GROUNDS)
+        lowest = max(min(spec.lowest, low - 1), -8)
+        above = max(spec.levels + spec.lowest, min(grounds + HEADROOM, 32))
+        return replace(spec, lowest=lowest, levels=above - lowest, ground_levels=grounds)
 
     def settings(self, strategy: str | Strategy) -> Settings:
         """The traced part, for one strategy or the one of a name."""

@@ -104,9 +104,8 @@ def sense(
     seed = fold(world.seed, SENSE, world.decisions)
     if program.sensor == "oracle":
         area = (program.spec.size_x, program.spec.size_y)
-        view = oracle.measure(
-            arena, world.pose, area, spacing=min(ORACLE_SPACING, program.spec.pitch), weight=ORACLE_WEIGHT
-        )
+        spacing, levels = min(ORACLE_SPACING, program.spec.pitch), program.spec.levels + program.spec.lowest
+        view = oracle.measure(arena, world.pose, area, spacing=spacing, levels=levels, weight=ORACLE_WEIGHT)
     elif program.sensor == "raycast":
         view = raycast.measure(
             arena, pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat, attitude

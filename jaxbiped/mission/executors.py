@@ -9,7 +9,8 @@ from __future__ import annotations
 import jax.numpy as jnp
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.geometry.boxes import ground_height, plan_distance
+from jaxbiped.arenas.ground import ground_height, rises_near
+from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.execution import CHECKS, ODOMETRY, TOUCH, Execution, Executor
@@ -25,10 +26,10 @@ from jaxbiped.sensing.odometry import drift
 def kinematic(arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
     """Nominal displacement and time (Table 2); odometry drifts from what was walked.
 
-    Referee, from the true arena: the robot collides when a box between its foot, raised by a step, and its head
-    comes nearer than the body's radius to its axis. It falls when the ground where it comes to stand is not at the
-    height that the primitive steps to: a straight step over an edge, or a step up where no bump is. An edge may lie up
-    to `edge_tolerance` off, and the height may be off by `height_tolerance`.
+    Referee, from the true arena: the robot collides when a box between its foot, raised by a step, and its head, or
+    terrain above that foot, comes nearer than the body's radius to its axis. It falls when the ground where it comes to
+    stand is not at the height that the primitive steps to: a straight step over an edge, or a step up where no bump is.
+    An edge may lie up to `edge_tolerance` off, and the height may be off by `height_tolerance`.
     """
     limits = settings.limits
     cos, sin = jnp.cos(command.turn), jnp.sin(command.turn)
@@ -37,7 +38,7 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
     yaw = wrap_angle(world.pose.yaw + command.turn)
     expected = world.pose.z + command.rise * limits.rise
     around = jnp.array([-1.0, 0.0, 1.0]) * limits.edge_tolerance
-    grounds = ground_height(arena.boxes, x + around * jnp.cos(yaw), y + around * jnp.sin(yaw))
+    grounds = ground_height(arena, x + around * jnp.cos(yaw), y + around * jnp.sin(yaw))
     error = jnp.abs(grounds - expected)
     nearest = jnp.argmin(error)
     z = grounds[nearest]
@@ -51,6 +52,7 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
         between = (arena.boxes.top > foot + settings.body.step + TOUCH) & (arena.boxes.bottom < foot + head - TOUCH)
         hit = arena.boxes.used & between & (plan_distance(arena.boxes, px, py) < limits.body_radius)
         collided = collided | jnp.any(hit)
+        collided = collided | rises_near(arena.terrain, px, py, limits.body_radius, foot + settings.body.step + TOUCH)
     outside = (x < 0) | (x > arena.size_xy[0]) | (y < 0) | (y > arena.size_xy[1])
 
     seed = fold(world.seed, ODOMETRY, world.decisions)

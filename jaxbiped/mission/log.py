@@ -43,6 +43,15 @@ class Mark:
 
 
 @dataclass(frozen=True)
+class Ground:
+    """True terrain, as `geometry.height_field.HeightField`."""
+
+    heights: Float32[np.ndarray, "P Q"]  # [m]; NaN in holes
+    origin_xy: Float[np.ndarray, "2"]  # [m] of heights[0, 0]
+    pitch: float  # [m]
+
+
+@dataclass(frozen=True)
 class Picture:
     """What one measurement looked like."""
 
@@ -86,6 +95,7 @@ class MissionLog:
     voxels: Bool[np.ndarray, "T H W Z"] | None = None  # occupied; k: (k - 1/2) to (k + 1/2) `level_height`
     level_height: float = 0.03  # [m]
     walk: Walk | None = None  # of a biped that was simulated
+    terrain: Ground | None = None
 
     def __post_init__(self):
         count = len(self.time)

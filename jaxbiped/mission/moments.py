@@ -15,7 +15,7 @@ from jaxbiped.geometry.pose import to_world
 from jaxbiped.mapping import level_view
 from jaxbiped.mapping.cobstacles import occupied_levels
 from jaxbiped.mission.decision import Thought
-from jaxbiped.mission.log import Mark, Outline, Walk
+from jaxbiped.mission.log import Ground, Mark, Outline, Walk
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import World
 
@@ -122,6 +122,14 @@ def outlines(arena: Arena) -> tuple[Outline, ...]:
         kind = "gate" if boxes.overhead[m] else "bump" if boxes.top[m] <= 0.0601 else "obstacle"
         found.append(Outline(corners, kind, float(boxes.bottom[m]), float(boxes.top[m]), way_of(arena, m)))
     return tuple(found)
+
+
+def ground(arena: Arena) -> Ground | None:
+    """The true terrain."""
+    if arena.terrain is None:
+        return None
+    terrain = jax.device_get(arena.terrain)
+    return Ground(np.asarray(terrain.heights), np.asarray(terrain.origin_xy, float), float(terrain.pitch))
 
 
 def way_of(arena: Arena, m: int | np.integer) -> tuple[float, float, float, float] | None:

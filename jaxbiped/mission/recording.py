@@ -19,7 +19,7 @@ from PIL import Image
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.mission.log import Mark, MissionLog, Outline, Picture, Walk
+from jaxbiped.mission.log import Ground, Mark, MissionLog, Outline, Picture, Walk
 
 FORMAT = 1
 FILE = "mission.npz"  # in a results folder
@@ -58,6 +58,8 @@ def save_log(path: str | Path, log: MissionLog, facts: Mapping[str, Any] | None 
         arrays |= {"voxels": np.packbits(log.voxels, axis=None), "voxels_shape": np.array(log.voxels.shape)}
     if log.walk is not None:
         arrays |= {"walk_qpos": log.walk.qpos, "walk_moment": log.walk.moment}
+    if log.terrain is not None:
+        arrays |= {f"terrain_{name}": np.asarray(value) for name, value in vars(log.terrain).items()}
     if log.pictures:
         arrays |= ragged("left", [jpeg(each.left) for each in log.pictures])
         arrays["disparity"] = np.stack([np.rint(each.disparity * FRACTION).astype(np.uint16) for each in log.pictures])
@@ -99,6 +101,9 @@ def to_log(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> MissionLog:
         shape = tuple(int(n) for n in arrays["voxels_shape"])
         voxels = np.unpackbits(arrays["voxels"], count=int(np.prod(shape))).astype(bool).reshape(shape)
     walk = Walk(arrays["walk_qpos"], arrays["walk_moment"]) if "walk_qpos" in arrays else None
+    terrain = None
+    if "terrain_heights" in arrays:
+        terrain = Ground(arrays["terrain_heights"], arrays["terrain_origin_xy"], float(arrays["terrain_pitch"]))
     outlines = [
         Outline(**each | {"corners_xy": np.array(each["corners_xy"]), "way": tuple(each.get("way") or ()) or None})
         for each in header["outlines"]
@@ -115,6 +120,7 @@ def to_log(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> MissionLog:
         pictures=pictures,
         voxels=voxels,
         walk=walk,
+        terrain=terrain,
     )
 
 

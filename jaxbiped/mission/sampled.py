@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.ground import ground_height
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.mission.execution import ODOMETRY, PLAY, Execution
 from jaxbiped.mission.library import PLAYED, Library
@@ -29,13 +30,14 @@ def sampled(arena: Arena, world: World, command: Command, settings: Settings) ->
     mean error of the trials on the mild set and a normal one of their covariance, and falls as often as there. A step
     over an edge stands as often as with the edge at that distance and yaw, which are those of the true arena on the
     ways of the two feet. A rise ahead of a straight step stops the toes; whoever comes to stand nearer to an edge than
-    the trials on rims allow falls. Torso and head, swaying as measured, and the feet collide with true boxes where
-    those of the simulated biped would. Getting down and up displaces nothing: it was 0.1 mm.
+    the trials on rims allow falls. Torso and head, swaying as measured, and the feet collide with true boxes and
+    terrain where those of the simulated biped would. Getting down and up displaces nothing: it was 0.1 mm. On terrain
+    the robot comes to stand at the height of the ground between its feet, where that is borne.
 
     Odometry counts the true displacement with the drift of every executor. Consumes the channels PLAY and ODOMETRY of
     the mission's seed.
     """
-    library, boxes, limits = settings.library, arena.boxes, settings.limits
+    library, limits = settings.library, settings.limits
     length, _, offset = library.feet
     seed = fold(world.seed, PLAY, world.decisions)
     walks = (command.primitive == Primitive.STRAIGHT_FORWARD) | (command.primitive == Primitive.PASS_GATE)
@@ -50,15 +52,19 @@ def sampled(arena: Arena, world: World, command: Command, settings: Settings) ->
 
     at = moved_by(world.pose, turned)
     begun = moved_by(at, aside)
-    rises, drops = edges(boxes, begun, offset, limits.rise)
+    rises, drops = edges(arena, begun, offset, limits.rise)
     nearest = jnp.min(rises) - length / 2
     stopped = walks & (ahead[0] > nearest) & (ahead[0] + library.rims[0] <= jnp.min(rises))
     ahead = ahead.at[0].set(jnp.where(stopped, jnp.maximum(nearest, 0.0), ahead[0]))
     after = moved_by(begun, ahead)
-    after = Pose(after.x, after.y, world.pose.z + command.rise * limits.rise, after.yaw)
+    height = world.pose.z + command.rise * limits.rise
+    if arena.terrain is not None:
+        ground = ground_height(arena, after.x, after.y)
+        height = jnp.where(jnp.abs(ground - height) <= limits.height_tolerance, ground, height)
+    after = Pose(after.x, after.y, height, after.yaw)
     stands = stand_probability(library, kind, command.length, jnp.where(command.rise > 0, rises, drops))
     trips = climbs & (hashing.uniform(seed, 0, 3) >= stands)
-    slides = off_ground(boxes, after, offset, library.rims, limits.height_tolerance)
+    slides = off_ground(arena, after, offset, library.rims, limits.height_tolerance)
 
     moves = (turned != 0).any() | (aside != 0).any() | (ahead != 0).any()
     sway = jnp.where(moves, library.sway[kind], 0.0)
@@ -70,8 +76,8 @@ def sampled(arena: Arena, world: World, command: Command, settings: Settings) ->
         poses.append(Pose(x, y, highest, after.yaw))
     collided = jnp.zeros((), bool)
     for pose in poses:
-        collided = collided | body_touches(boxes, pose, head, sway)
-        collided = collided | feet_touch(boxes, pose, library.feet, highest + settings.body.step)
+        collided = collided | body_touches(arena, pose, head, sway)
+        collided = collided | feet_touch(arena, pose, library.feet, highest + settings.body.step)
 
     dx, dy = to_robot(world.pose, after.x, after.y)
     true = (dx, dy, wrap_angle(after.yaw - world.pose.yaw))

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxbiped.config import Model
+from jaxbiped.geometry.height_field import HeightField, height_range
 from jaxbiped.mapping import Body, GridSpec, MapParams
 from jaxbiped.mission.config import BELOW_POINTS as BELOW_POINTS
 from jaxbiped.mission.config import ICP as ICP
@@ -84,11 +85,12 @@ class Program:
     fading: bool = False  # the map forgets what has moved
 
 
-def program(config: MissionConfig, size_xy: tuple[float, float]) -> Program:
-    """The static part of a config for arenas of one size [m]."""
+def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> Program:
+    """The static part of a config for arenas of one size [m], and with such terrain, whose heights are concrete."""
+    heights = (0.0, 0.0) if terrain is None else height_range(terrain)
     footing = config.executor != "kinematic" if config.foot_placement is None else config.foot_placement
     return Program(
-        config.grid(size_xy),
+        config.grid(size_xy, heights),
         config.camera.image,
         config.sensor,
         config.executor,

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.geometry.boxes import ground_height
+from jaxbiped.arenas.ground import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridMap, GridSpec, empty
@@ -102,7 +102,7 @@ def start(
 ) -> tuple[World, Mind]:
     """One mission before its first measurement. The robot knows where it starts (paper, 2, condition 2)."""
     x, y, yaw = arena.start_xyyaw
-    pose = Pose(x, y, ground_height(arena.boxes, x, y), yaw)
+    pose = Pose(x, y, ground_height(arena, x, y), yaw)
     away = jnp.hypot(arena.goal_xy[0] - x, arena.goal_xy[1] - y)
     no, zero = jnp.zeros((), bool), jnp.zeros((), jnp.int32)
     code = jnp.where(away <= settings.limits.goal_radius, Code.REACHED, Code.RUNNING).astype(jnp.int32)

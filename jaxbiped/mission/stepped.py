@@ -17,7 +17,7 @@ from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.log import MissionLog, Picture
-from jaxbiped.mission.moments import marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
+from jaxbiped.mission.moments import ground, marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind, World, start
@@ -175,6 +175,7 @@ class Recorder:
             goal_xy=np.asarray(arena.goal_xy, float),
             outlines=outlines(arena),
             landmarks=marks(arena),
+            terrain=ground(arena),
             pictures=(*self.pictures, *self.pictures[-1:]),
             outcome=code.label,
             true_z=np.array([m["z"] for m in moments]),

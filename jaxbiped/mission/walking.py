@@ -19,6 +19,7 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped import physics
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.ground import refuse_terrain
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
@@ -87,8 +88,9 @@ def walk(
       Results in the order of the jobs, on the host; padding stays RUNNING.
 
     Raises:
-      InputError: a device that is not there, or a biped that cannot play its primitives.
+      InputError: a device that is not there, a biped that cannot play its primitives, or arenas with terrain.
     """
+    refuse_terrain(arenas, f"executor {program.executor}")
     return Walkers(arenas, settings, jobs, program, config, observer, eyes).work(on_progress)
 
 

@@ -32,6 +32,7 @@ from jaxbiped.report.pictures import (
     class_image,
     draw_goal,
     draw_lines,
+    draw_terrain,
     frame,
     legend,
     mark_patch,
@@ -93,6 +94,8 @@ class Scene:
         log, k, ax = self.log, self.k, self.ax
         if log.classes[0].size <= MOST_CELLS_LINED:
             draw_lines(ax, moment(log, 0), k)
+        if log.terrain is not None:
+            draw_terrain(ax, log.terrain, k)
         for outline in log.outlines:
             ax.add_patch(
                 patches.Polygon(outline.corners_xy * k, fill=False, ec=OUTLINES[outline.kind], lw=1.2, zorder=3)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.report.pictures import CENTIMETRES, COLOURS, INK, METRES, Axis, draw_map, save_figure
+from jaxbiped.report.pictures import CENTIMETRES, COLOURS, INK, METRES, Axis, draw_map, hillshade, save_figure
 from jaxbiped.report.style import own_style
 
 LARGEST_IN_CENTIMETRES = 5.0  # [m] a map beyond this is drawn in metres
@@ -159,6 +159,31 @@ def save_classes(
     ax.set_title(title, fontsize=10)
     handles = [patches.Patch(fc=COLOURS[cell], ec="#888888", lw=0.6, label=cell.name.lower()) for cell in Cell]
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False, labelcolor=INK)
+    save_figure(figure, path)
+
+
+@own_style()
+def save_elevation(
+    path: str | Path,
+    heights: Float[np.ndarray, "P Q"],
+    origin_xy: Float[np.ndarray, "2"],
+    pitch: float,
+    title: str = "",
+) -> None:
+    """A PNG of an elevation map: its heights [m] in colours, lit from the upper left; holes are white."""
+    rows, columns = heights.shape
+    figure = Figure(figsize=(8.0, float(np.clip(7.0 * rows / columns, 2.5, 10)) + 0.5), layout="constrained")
+    ax = figure.subplots()
+    scale = Normalize(float(np.nanmin(heights)), float(np.nanmax(heights)))
+    image = colormaps["viridis"](scale(heights))[..., :3] * (0.35 + 0.65 * hillshade(heights, pitch))[..., None]
+    image = np.where(np.isfinite(heights)[..., None], image, 1.0)
+    (x, y), half = origin_xy, pitch / 2
+    extent = (x - half, x + (columns - 0.5) * pitch, y - half, y + (rows - 0.5) * pitch)
+    ax.imshow(np.clip(image, 0, 1), origin="lower", extent=extent, interpolation="nearest")
+    ax.set(xlabel="x [m]", ylabel="y [m]")
+    ax.tick_params(labelsize=8, color=INK)
+    ax.set_title(title, fontsize=10)
+    figure.colorbar(matplotlib_scale(scale), ax=ax, label="height [m]", shrink=0.8)
     save_figure(figure, path)
 
 

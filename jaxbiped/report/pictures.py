@@ -19,7 +19,7 @@ from jaxbiped.arenas.arena import DISC_RADIUS, SQUARE_SIDE
 from jaxbiped.files import write_whole
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mission.log import Mark, MissionLog, Outline
+from jaxbiped.mission.log import Ground, Mark, MissionLog, Outline
 from jaxbiped.report.axis import CENTIMETRES as CENTIMETRES
 from jaxbiped.report.axis import METRES as METRES
 from jaxbiped.report.axis import Axis as Axis
@@ -37,6 +37,7 @@ PLAN, TRACK, INK = "#118a2e", "#222222", "#333333"
 OUTLINES = {"obstacle": "#8e1f1c", "bump": "#163f75", "gate": "#5b2a86"}
 GOAL_RADIUS = 0.10  # [m] "reached" (paper, 3.1)
 MOST_CELLS_LINED = 6000  # beyond, cells are too small for lines around them and numbers in them
+MOST_SHADE = 0.55  # of opacity of the shadows of terrain
 MOST_ARROWS = 150  # beyond, a plan is a line
 
 
@@ -61,6 +62,7 @@ def draw_map(
     goal_radius: float | None = GOAL_RADIUS,
     outlines: tuple[Outline, ...] = (),
     landmarks: tuple[Mark, ...] = (),
+    terrain: Ground | None = None,
     axis: Axis = CENTIMETRES,
 ) -> None:
     """Draw a map and what happens on it into `ax`.
@@ -71,7 +73,7 @@ def draw_map(
       plan_xy: [m] the path to go: arrows from point to point, a line when there are many.
       track_xy: [m] the path walked.
       start_xy, goal_xy: [m] a ring, and a cross with a broken circle of `goal_radius` [m] (None: no circle).
-      outlines, landmarks: the truth that the map is about.
+      outlines, landmarks, terrain: the truth that the map is about.
       axis: the unit of the axes.
     """
     k = axis.per_metre
@@ -84,6 +86,8 @@ def draw_map(
     if small:
         draw_lines(ax, grid, k)
         draw_levels(ax, grid, k)
+    if terrain is not None:
+        draw_terrain(ax, terrain, k)
     for outline in outlines:
         ax.add_patch(patches.Polygon(outline.corners_xy * k, fill=False, ec=OUTLINES[outline.kind], lw=1.2, zorder=3))
     for mark in landmarks:
@@ -102,6 +106,16 @@ def draw_map(
     frame(ax, (x0, x1, y0, y1), axis)
 
 
+def hillshade(heights: Float[np.ndarray, "P Q"], pitch: float) -> Float[np.ndarray, "P Q"]:
+    """How bright a surface of such heights [m] is, 0 to 1, lit from the upper left; level ground is at 0.71.
+
+    Where the slope is unknown, at holes, it is taken to be level.
+    """
+    slope_y, slope_x = (np.nan_to_num(slope) for slope in np.gradient(heights, pitch))
+    light = np.array([-0.5, 0.5, math.sqrt(0.5)])
+    return np.clip((light[2] - light[0] * slope_x - light[1] * slope_y) / np.sqrt(1 + slope_x**2 + slope_y**2), 0, 1)
+
+
 def turned(grid: ClassGrid, k: float) -> Affine2D:
     """From the axes of a grid, in units of which a metre has `k`, to those of its frame, in which it may lie turned."""
     x0, _, y0, _ = (value * k for value in grid.extent)
@@ -115,6 +129,23 @@ def draw_lines(ax: Axes, grid: ClassGrid, k: float) -> None:
     style = {"color": "#606060", "lw": 0.4, "alpha": 0.22, "zorder": 1, "transform": turned(grid, k) + ax.transData}
     ax.vlines(np.linspace(x0, x1, columns + 1)[1:-1], y0, y1, **style)
     ax.hlines(np.linspace(y0, y1, rows + 1)[1:-1], x0, x1, **style)
+
+
+def draw_terrain(ax: Axes, terrain: Ground, k: float) -> None:
+    """Terrain as the shadows and lights of its slopes, over the map; holes are hatched."""
+    rows, columns = terrain.heights.shape
+    x, y = terrain.origin_xy
+    extent = tuple(v * k for v in (x, x + (columns - 1) * terrain.pitch, y, y + (rows - 1) * terrain.pitch))
+    light = hillshade(terrain.heights, terrain.pitch) - math.sqrt(0.5)
+    shade = np.zeros((rows, columns, 4))
+    shade[..., :3] = np.where(light > 0, 1.0, 0.0)[..., None]
+    shade[..., 3] = np.clip(1.2 * np.abs(light), 0, MOST_SHADE)
+    ax.imshow(shade, origin="lower", extent=extent, interpolation="bilinear", zorder=1.5)
+    if np.isnan(terrain.heights).any():
+        places = [np.linspace(low, high, count) for low, high, count in zip(
+            extent[::2], extent[1::2], (columns, rows), strict=True)]  # fmt: skip
+        holes = np.isnan(terrain.heights).astype(float)
+        ax.contourf(*places, holes, levels=[0.5, 1.5], colors="none", hatches=["xxxx"], zorder=1.6)
 
 
 def draw_levels(ax: Axes, grid: ClassGrid, k: float) -> None:
@@ -222,6 +253,7 @@ def save_mission(path: str | Path, log: MissionLog, *, title: str = "", panels: 
             goal_xy=tuple(log.goal_xy),
             outlines=log.outlines,
             landmarks=log.landmarks,
+            terrain=log.terrain,
         )
         ax.set_title(f"{log.time[t]:.0f} s: {caption(log, t)}", fontsize=9)
     for ax in axes[len(moments) :]:

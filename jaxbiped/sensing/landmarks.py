@@ -1,8 +1,9 @@
 """Which landmarks a view shows, and where it measures them.
 
-Measuring is modelled, not imaged: a landmark that is in both images, in range and not behind a box is found, and its
-centre is off by a normal error that grows with range. Correspondence is known (paper, 2,
-condition 2: sizes and places of landmarks are known). The yaw of a square, known modulo 90 degrees, is not used.
+Measuring is modelled, not imaged: a landmark that is in both images, in range and not behind a box or terrain is
+found, and its centre is off by a normal error that grows with range. Correspondence is known (paper, 2, condition 2:
+sizes and places of landmarks are known). The yaw of a square, known modulo 90 degrees, is not used. On terrain a
+landmark lies at the height of the ground.
 """
 
 from __future__ import annotations
@@ -15,10 +16,11 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, UInt32
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena
+from jaxbiped.arenas.ground import cast_ground, ground_height
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot
-from jaxbiped.geometry.rays import cast_boxes, nearness
+from jaxbiped.geometry.rays import cast_boxes, key, nearness
 from jaxbiped.sensing import hashing
 from jaxbiped.sensing.camera import Camera, ImageSpec, check_camera, mount, placed
 from jaxbiped.sensing.config import LandmarkConfig as LandmarkConfig
@@ -26,7 +28,7 @@ from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.sensing.view import Sightings
 
 LANDMARK = 4  # channel of a view's seed
-HIDDEN_MARGIN = 1e-3  # relative: a box that only touches the landmark does not hide it
+HIDDEN_MARGIN = 1e-3  # relative: a box, or the ground, that only touches the landmark does not hide it
 RENDERED, IDEAL, REAL = (PRESETS[name].landmarks for name in ("rendered", "ideal", "real"))
 
 
@@ -67,17 +69,19 @@ def sight(
     marks = arena.landmarks
     level = jnp.zeros_like(pose.yaw)
     origin, basis = placed(pose, mount(camera, look, squat), level, level)
-    offset = jnp.stack([marks.x, marks.y, jnp.zeros_like(marks.x)]) - origin[:, None]
+    on_ground = jnp.zeros_like(marks.x) if arena.terrain is None else ground_height(arena, marks.x, marks.y)
+    offset = jnp.stack([marks.x, marks.y, on_ground]) - origin[:, None]
     right, down, depth = (jnp.sum(basis[:, i, None] * offset, axis=0) for i in range(3))  # camera frame
     x, y = right / depth, down / depth
     u, v = camera.focal * x + image.centre[0], camera.focal * y + image.centre[1]
     disparity = camera.focal * camera.baseline / depth
     in_view = (depth > 0) & (disparity <= camera.max_disparity) & (v >= 0) & (v <= image.height - 1)
     in_view = in_view & (u - disparity >= 0) & (u <= image.width - 1)
-    boxes = cast_boxes(
-        arena.boxes, jnp.zeros_like(arena.boxes.used), origin, basis, x, y, jnp.zeros(x.shape, jnp.int32)
-    )
-    hidden = nearness(boxes) * depth > 1 + HIDDEN_MARGIN
+    behind = jnp.zeros(x.shape, jnp.int32)
+    if arena.terrain is not None:
+        behind = key(cast_ground(arena, origin, basis, x, y), jnp.zeros((), bool))
+    before = cast_boxes(arena.boxes, jnp.zeros_like(arena.boxes.used), origin, basis, x, y, behind)
+    hidden = nearness(before) * depth > 1 + HIDDEN_MARGIN
     forward, left = to_robot(pose, marks.x, marks.y)
     distance = jnp.sqrt(forward * forward + left * left)
     furthest = jnp.where(marks.kind == SQUARE, noise.furthest_square, noise.furthest_circle)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.ground import HOLE, terrain_height
 from jaxbiped.core.checks import finite, whole_number
 from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
@@ -34,8 +35,8 @@ def measure(
     """Points of one whole arena in the robot frame of the true `pose`; all arguments after it are static.
 
     On a lattice of `spacing` [m] over the area `size_xy` [m] there is in each column one point on the ground, and one
-    in each other level that a box fills at least in part. Columns are centres of squares, so that none lies on the edge
-    of a cell of a pitch that `spacing` divides.
+    in each other level that a box, or terrain, fills at least in part; where a hole is, there is none. Columns are
+    centres of squares, so that none lies on the edge of a cell of a pitch that `spacing` divides.
 
     Args:
       level_height: [m] between the points inside boxes; level l is about l times that.
@@ -58,6 +59,12 @@ def measure(
     axes = ((np.arange(round(size / spacing), dtype=np.float32) + 0.5) * np.float32(spacing) for size in size_xy)
     x, y = (jnp.asarray(values.reshape(-1)) for values in np.meshgrid(*axes))
     ground, ceiling, cover = heights(arena.boxes, x, y)
+    known = jnp.ones_like(ground[None], bool)
+    if arena.terrain is not None:
+        under = terrain_height(arena.terrain, x, y)
+        stands, _, _ = heights(arena.boxes, x, y, floor=HOLE)
+        ground = jnp.maximum(stands, under)
+        known = ground[None] != HOLE
     level = (np.arange(levels, dtype=np.float32) * np.float32(level_height))[:, None]
     half = level_height / 2
     inside_floor = level < ground - half  # the ground itself has a point of its own, and is alone in its level
@@ -65,7 +72,7 @@ def measure(
     # A level that a box fills in part is measured where the box begins or ends.
     height = jnp.where(inside_floor, level, jnp.clip(level, ceiling, jnp.maximum(ceiling, cover)))
     z = jnp.concatenate([ground[None], height]) - pose.z
-    there = jnp.concatenate([jnp.ones_like(ground[None], bool), inside_floor | inside_overhead])
+    there = jnp.concatenate([known, inside_floor | inside_overhead])
     forward, left = to_robot(pose, x, y)
     there = there & jnp.isfinite(forward + left + z)
     points = (jnp.where(there, axis, 0.0).reshape(-1) for axis in (forward[None], left[None], z))
@@ -74,9 +81,9 @@ def measure(
 
 
 def heights(
-    boxes: Boxes, x: Float[Array, "N"], y: Float[Array, "N"]
+    boxes: Boxes, x: Float[Array, "N"], y: Float[Array, "N"], floor: float = 0.0
 ) -> tuple[Float[Array, "N"], Float[Array, "N"], Float[Array, "N"]]:
-    """Height [m] of the ground (else 0), and lowest bottom (else inf) and highest top (else -inf) of what hangs there.
+    """Height [m] of the ground (else `floor`), lowest bottom (else inf), highest top (else -inf) of what hangs there.
 
     Ground and ceiling are those of `geometry.boxes`; as a loop, since XLA would search the boxes again for each level.
     """
@@ -89,5 +96,5 @@ def heights(
         cover = jnp.where(here & overhead, jnp.maximum(cover, box.top[0]), cover)
         return (ground, ceiling, cover), None
 
-    nothing = (jnp.zeros_like(x), jnp.full_like(x, jnp.inf), jnp.full_like(x, -jnp.inf))
+    nothing = (jnp.full_like(x, floor), jnp.full_like(x, jnp.inf), jnp.full_like(x, -jnp.inf))
     return jax.lax.scan(include, nothing, jax.tree.map(lambda leaf: leaf[:, None], boxes))[0]  # slots of one

@@ -1,4 +1,4 @@
-"""The ray-cast stereo camera: true depth of boxes and floor, made into what a stereo matcher would have measured."""
+"""The ray-cast stereo camera: true depth of boxes, floor and terrain, as a stereo matcher would measure it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int32, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.ground import cast_ground
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.geometry.rays import cast_boxes, cast_floor, key, marked, nearness
+from jaxbiped.geometry.rays import cast_boxes, key, marked, nearness
 from jaxbiped.sensing import noise as stereo
 from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, check_camera, mount, placed, rays
 from jaxbiped.sensing.noise import StereoNoise
@@ -68,7 +69,7 @@ def cast(
     """
     origin, basis = placed(pose, at, roll, pitch)
     x, y = (values.reshape(-1) / camera.focal for values in np.meshgrid(*margin(image)))
-    floor = key(cast_floor(arena.size_xy, origin, basis, x, y), floor_mark)
+    floor = key(cast_ground(arena, origin, basis, x, y), floor_mark)
     keys = cast_boxes(arena.boxes, box_marks, origin, basis, x, y, floor)
     return keys.reshape(image.rows + 2, image.columns + 2)
 

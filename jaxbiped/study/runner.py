@@ -9,6 +9,7 @@ from functools import partial
 from jaxtyping import Array, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.ground import WITH_TERRAIN, refuse_terrain
 from jaxbiped.mission.eyes import Eyes, eyes_for
 from jaxbiped.mission.queue import Result
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, program
@@ -18,12 +19,15 @@ from jaxbiped.study.groups import Group
 
 
 def program_for(config: MissionConfig, arena: Arena) -> Program:
-    """The static part of missions in an arena of this size.
+    """The static part of missions in an arena of this size, with this terrain.
 
     Raises:
-      InputError: a pitch that does not divide it.
+      InputError: a pitch that does not divide it; terrain that the sensor or the executor does not know.
     """
-    return program(config, tuple(round(float(side), 6) for side in arena.size_xy))
+    for kind, choice in (("sensor", config.sensor), ("executor", config.executor)):
+        if choice not in WITH_TERRAIN[kind]:
+            refuse_terrain(arena, f"{kind} {choice}")
+    return program(config, tuple(round(float(side), 6) for side in arena.size_xy), arena.terrain)
 
 
 def check_mission(config: MissionConfig) -> None:

@@ -16,7 +16,7 @@ from PIL import Image
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mission.log import Mark, MissionLog, Outline, Picture
+from jaxbiped.mission.log import Ground, Mark, MissionLog, Outline, Picture
 from jaxbiped.report import animation, pictures
 
 
@@ -208,3 +208,41 @@ def test_a_map_that_lies_turned_is_drawn_turned(yaw):
         assert ax.bbox.contains(x, y)
         expected = np.array(rgb(pictures.COLOURS[Cell(classes[i, j])]))
         assert np.abs(shown[int(shown.shape[0] - y), int(x)].astype(int) - expected).max() < 30
+
+
+def test_slopes_to_the_light_are_bright():
+    """From the upper left, at 45 degrees: level ground, ground facing it and facing away, and beside a hole."""
+    i, j = np.indices((4, 5)) * 0.1
+    level = np.sqrt(0.5)
+    np.testing.assert_allclose(pictures.hillshade(0 * i, 0.1), level)
+    np.testing.assert_allclose(pictures.hillshade((j - i) / np.sqrt(2), 0.1), 1.0)
+    np.testing.assert_allclose(pictures.hillshade((i - j) / np.sqrt(2), 0.1), 0.0, atol=1e-12)
+    holed = np.where((i == 0) & (j == 0), np.nan, i)
+    assert np.isfinite(pictures.hillshade(holed, 0.1)).all()
+
+
+def test_terrain_is_shaded_where_it_lies_and_holes_are_hatched(tmp_path):
+    """A ridge across the middle darkens one of its sides and leaves level ground as it is."""
+    heights = np.zeros((71, 91), np.float32)
+    heights[:, 40:50] = 0.05
+    heights[:20, 60:80] = np.nan
+    grid = ClassGrid(np.ones((14, 18), np.int8), np.zeros((14, 18), np.int8), np.zeros(2), 0.05)
+    bare, shaded = (drawn(grid, **what).astype(int) for what in ({}, {"terrain": Ground(heights, np.zeros(2), 0.01)}))
+    changed = np.abs(bare - shaded).sum(-1)
+    # past the holes; the far side of the ridge, from 49 to 50 cm, lies where the column from 45 cm on is looked at
+    assert (changed[6:-1, [4, 5, 12, 16]] < 3).all()
+    assert (shaded[6:-1, 9].sum(-1) < bare[6:-1, 9].sum(-1) - 10).all()
+
+
+def test_holes_are_hatched(tmp_path):
+    heights = np.zeros((71, 91), np.float32)
+    heights[20:50, 30:60] = np.nan
+    grid = ClassGrid(np.ones((14, 18), np.int8), np.zeros((14, 18), np.int8), np.zeros(2), 0.05)
+    images = []
+    for name, terrain in (("a", None), ("b", Ground(heights, np.zeros(2), 0.01))):
+        pictures.save_map(tmp_path / f"{name}.png", grid, terrain=terrain)
+        images.append(np.asarray(Image.open(tmp_path / f"{name}.png").convert("L"), int))
+    rows, columns = np.nonzero(np.abs(images[0] - images[1]) > 50)
+    assert len(rows) > 500
+    height, width = images[0].shape
+    assert columns.min() > 0.3 * width and columns.max() < 0.75 * width and rows.max() < 0.75 * height

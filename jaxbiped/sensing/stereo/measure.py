@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.ground import refuse_terrain
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.sensing.camera import CameraConfig, Mount
 from jaxbiped.sensing.landmarks import LandmarkNoise
@@ -69,6 +70,7 @@ class StereoSensor:
 
     def show(self, arena: Arena) -> None:
         """Render this arena from now on."""
+        refuse_terrain(arena, "sensor stereo")
         drawn = arena.size_xy, arena.boxes, arena.landmarks, arena.floor_contrast
         name = b"".join(np.asarray(leaf).tobytes() for leaf in jax.tree.leaves(drawn))
         if name != self.shown:
