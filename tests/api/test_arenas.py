@@ -12,13 +12,13 @@ import jaxbiped as jb
 from jaxbiped.arenas import sample
 from jaxbiped.study.comparison import strata
 
-SCENES = Path(__file__).parents[2] / "configs" / "scenes"
+FILES = sorted((Path(__file__).parents[2] / "configs" / "scenes").glob("experiment_*.toml"))
 
 
 def test_scenes_take_turns_and_stored_missions_are_played_again(tmp_path):
-    study = jb.Study(jb.Scenes(SCENES, count=12), ["full"], seed=1)
+    study = jb.Study(jb.Scenes(FILES, count=12), ["full"], seed=1)
     results = jb.evaluate(study)
-    names = [path.stem for path in sorted(SCENES.glob("*.toml"))]
+    names = [path.stem for path in FILES]
     rows = results.rows.sort("arena")
     assert rows["family"].to_list() == [names[k % len(names)] for k in range(12)]
     assert (rows["code"] == "reached").sum() >= 9
