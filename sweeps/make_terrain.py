@@ -12,9 +12,9 @@ import numpy as np
 FILE = Path(__file__).parents[1] / "configs" / "scenes" / "terrain_stairs.png"
 SIZE = 1.8, 1.4  # [m]
 PIXEL, GREY = 0.01, 0.001  # [m]
-TREADS, STEP = (0.60, 0.85, 1.10), 0.03  # [m] where steps begin, and how high they are
+TREADS, STEP = (0.60, 0.85, 1.10), 0.03  # [m] where steps begin to rise, over a pixel, and how high they are
 WALL = 0.20  # [m] high, along the side of the stairs
-ROUGH = 0.0025  # [m] of the ground, one standard deviation
+ROUGH = 0.001  # [m] of the ground, one standard deviation
 
 
 def stairs() -> np.ndarray:
@@ -22,7 +22,7 @@ def stairs() -> np.ndarray:
     rng = np.random.default_rng(1)
     shape = tuple(round(size / PIXEL) + 1 for size in SIZE[::-1])
     x, y = np.meshgrid(np.arange(shape[1]) * PIXEL, np.arange(shape[0]) * PIXEL)
-    heights = STEP * sum((x >= tread - 1e-9).astype(float) for tread in TREADS)
+    heights = STEP * sum((x > tread + 1e-9).astype(float) for tread in TREADS)
     bumps = cv2.GaussianBlur(rng.normal(size=shape), (0, 0), 3.0)
     heights += ROUGH * bumps / bumps.std()
     heights[(y > 1.15) & (x > 0.5)] = WALL

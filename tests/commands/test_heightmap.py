@@ -74,23 +74,6 @@ def test_the_written_elevation_gives_the_same_again(tmp_path):
     np.testing.assert_array_equal(again.levels, first.levels)
 
 
-def test_a_larger_robot_climbs_the_stairs_as_they_are(tmp_path):
-    """Steps of 12 cm are too high for one of 10 cm, too; at three quarters they are not: a level is its step."""
-    robot = (
-        "--robot.step",
-        "0.09",
-        "--robot.step-tolerance",
-        "0.01",
-        "--robot.standing",
-        "1.2",
-        "--robot.squatting",
-        "1.0",
-    )
-    grid = run(tmp_path, saved(tmp_path), *PICTURE, "--scale", "0.75", *robot, "--pitch", "0.15")
-    np.testing.assert_array_equal(grid.levels[0], LEVELS)
-    assert set(grid.classes[:4].ravel()) == {F, B}
-
-
 def test_holes_are_unmeasured(tmp_path):
     image = stairs()
     image[50:, 10:30, 3] = 0
