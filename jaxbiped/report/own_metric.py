@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
@@ -42,6 +44,8 @@ def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str) -> Figure:
         found = []
         for place, point in zip(places, points["point"], strict=True):
             value = own_estimate(rows.filter((pl.col("strategy") == name) & (pl.col("point") == point)), metric)
+            if value.valid and value.low is None:  # too few or too equal for an interval
+                value = replace(value, low=value.estimate, high=value.estimate)
             if value.valid:
                 found.append((float(place + shift), value))
         error_bars(

@@ -1,4 +1,4 @@
-"""Missions over the terrain of configs/scenes/terrain_stairs.toml, by the command, and what is written of them."""
+"""Missions over the terrain of configs/terrain/stairs.toml, by the command, and what is written of them."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.mission.recording import load_log
 from sweeps import make_terrain
 
-SCENE = Path(__file__).parents[2] / "configs" / "scenes" / "terrain_stairs.toml"
+SCENE = Path(__file__).parents[2] / "configs" / "terrain" / "stairs.toml"
 
 
 def test_the_map_is_what_the_script_writes():
