@@ -210,3 +210,15 @@ def test_affinity_is_asked_for_only_where_there_is_one():
         for file in (ROOT / folder).rglob("*.py"):
             text = file.read_text(encoding="utf-8")
             assert "os.sched_" not in text or 'hasattr(os, "sched_' in text or file == Path(__file__), file
+
+
+def test_a_script_that_turned_numba_off_is_told_so_in_one_line():
+    """The command line overrides it; in a script of the user's, Numba is theirs."""
+    code = (
+        "import numpy as np\nfrom jaxbiped import InputError, planning\ngrid = np.ones((1, 3, 4), np.int8)\n"
+        "try:\n    planning.field(grid, 0 * grid, planning.Costs(), planning.Rules(), np.array([[0, 0]]))\n"
+        "except InputError as error:\n    print(error)"
+    )
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "NUMBA_DISABLE_JIT: must be 0 or unset: planners are compiled by Numba (got 1)\n"

@@ -75,7 +75,7 @@ def step_through(arena, setting, seed, program=PROGRAM) -> Log:
         before = world, mind.look
         world, mind, view, command, thought = turn_once(world, mind, *batch, program)
         taken.append(row((thought.classes, thought.levels, mind.grid_map.votes, command), 0))
-        after = view, thought.pose, mind.grid_map, thought.classes, thought.levels, thought.ij
+        after = view, thought.pose, mind.grid_map, thought.classes, thought.levels, thought.problem.start_ij
         moments.append(Moment(*row((*before, *after), 0)))
     return Log(*stack(taken), tuple(moments), row(world, 0))
 

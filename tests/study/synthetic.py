@@ -41,6 +41,7 @@ def rows(arenas: int = 240, seed: int = 0, strategies: tuple[str, ...] = schema.
                 0.02,
             )
             values += (reachable, *((60.0, distance) if reachable else (None, None)))
+            values += (int(28 * share), None, 60.0)  # plans, their time, and what the first costs
             for name, value in zip(columns, values, strict=True):
                 columns[name].append(value)
     return pl.DataFrame(columns, schema=schema.SCHEMA)

@@ -28,8 +28,8 @@ def set_first(column, value):
     ("column", "value"),
     [
         ("code", "lost"),
-        ("strategy", "lucky"),
-        ("family", "maze"),
+        ("strategy", "<b>lucky</b>"),
+        ("family", "../maze"),
         ("success", False),
         ("code", "fell"),
         ("distance", None),

@@ -10,6 +10,7 @@ import pytest
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Result, tally
 from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.state import Planned
 from jaxbiped.study.search import sobol
 from jaxbiped.study.trials import objective
 from jaxbiped.study.tune import FIRST_TRAINING, TuneConfig, tune
@@ -34,7 +35,8 @@ class Made:
         zero = np.zeros(time.shape)
         code = np.where(failed, Code.FELL, Code.REACHED)
         on_progress(tally(code.ravel()))
-        return Result(code, zero + 1, time, zero.astype(int), zero.astype(int), zero, zero, zero)
+        whole = zero.astype(int)
+        return Result(code, zero + 1, time, whole, whole, zero, zero, zero, Planned(zero, whole, zero))
 
 
 def test_finds_the_best_costs_and_beats_the_start_and_the_sweep():
@@ -105,7 +107,8 @@ def test_objective_of_missions():
     code = np.array([Code.REACHED, Code.REACHED, Code.FELL, Code.INVALID])
     time = np.array([500.0, 5000.0, 20.0, np.nan])
     rest = np.zeros(4)
-    result = Result(code, rest, time, rest.astype(int), rest.astype(int), rest, rest, rest)
+    whole = rest.astype(int)
+    result = Result(code, rest, time, whole, whole, rest, rest, rest, Planned(rest, whole, rest))
     assert objective(result, 1800.0).tolist() == [500.0, 1800.0, 1800.0, 1800.0]
 
 

@@ -11,10 +11,14 @@ import ctypes
 
 import jax
 import numpy as np
-from numba import carray, cfunc, njit, types
+from numba import carray, cfunc, config, njit, types
 from numba.extending import intrinsic
 
+from jaxbiped.errors import InputError
 from jaxbiped.planning.compiled import objects
+
+if config.DISABLE_JIT:  # the command line overrides it; a script's own setting is not ours to change
+    raise InputError("must be 0 or unset: planners are compiled by Numba", field="NUMBA_DISABLE_JIT", value=1)
 
 # Places of the fields, in words of 8 bytes from the beginning of their structure.
 FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULTS = 1, 7, 9, 14
