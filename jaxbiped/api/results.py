@@ -10,18 +10,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
+import pydantic
 
+from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.study import store
 from jaxbiped.study.comparison import Comparison, compare, default_pairs
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import groups_of, only_point, shards
 from jaxbiped.study.schema import ordered, validate
-from jaxbiped.study.sweep import SweepConfig
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+class Kept(Model):
+    """A config as it was stored: nothing in it is looked up, so that nothing is imported."""
+
+    model_config = pydantic.ConfigDict(extra="allow", frozen=True)
+
 
 METRICS = ("success", "distance", "time")
 
@@ -166,16 +173,13 @@ class Results:
         Raises:
           InputError: a folder that exists, a full disk.
         """
-        config = (SweepConfig if "axes" in self.config else StudyConfig).model_validate(self.config)
-        points = tuple(config.points()) if self.axes else only_point(config)
-        groups = groups_of(config, points)
-        swept = self.points if self.axes else None
-        with store.create(folder, config, seed=config.seed, arenas=config.arenas, points=swept) as results:
-            for shard in shards(config, len(groups), swept=bool(self.axes)):
-                here, arena = groups[shard.group], pl.col("arena")
-                mine = pl.col("point").is_in(here.points) & pl.col("strategy").is_in(here.strategies)
-                block = (arena >= shard.first) & (arena < shard.first + shard.count)
-                results.append(self.rows.filter(mine & block), shard.number)
+        config, swept = Kept.model_validate(self.config), self.points if self.axes else None
+        with store.create(
+            folder, config, seed=self.config["seed"], arenas=self.config["arenas"], points=swept
+        ) as results:
+            numbered = self.rows.with_columns(block=pl.col("arena") // self.config["shard"])
+            for block in numbered.partition_by("block", include_key=False, maintain_order=True):
+                results.append(block)
             results.finish()
         return Path(folder)
 

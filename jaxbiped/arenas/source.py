@@ -25,7 +25,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes
 
 Generator = Callable[[PRNGKeyArray], Arena]
-NAME = re.compile(r"[A-Za-z][\w .+-]{0,39}")  # shown in tables, figures and pages
+NAME = re.compile(r"[A-Za-z0-9][\w .+-]{0,39}")  # shown in tables, figures and pages
 OWN = 2  # fold_in of an arena's key, for generators that people bring
 
 
@@ -40,12 +40,14 @@ class Family:
     """
 
     name: str
-    generator: Generator = field(repr=False)
+    generator: Generator = field(repr=False, metadata={"static": True})
 
     def __post_init__(self):
-        if not isinstance(self.name, str) or not NAME.fullmatch(self.name):
-            message = "must begin with a letter and have at most 40 letters, digits, blanks and . _ + -"
-            raise InputError(message, field="name of a family", value=self.name)
+        check_name(self.name)
+        try:
+            hash(self.generator)
+        except TypeError:
+            raise InputError("its generator cannot be hashed", field=f"family {self.name}") from None
 
     def arena(self, key: PRNGKeyArray) -> Arena:
         """One arena, checked.
@@ -99,12 +101,22 @@ class SceneFamily:
 OwnFamily = Family | SceneFamily
 
 
+def check_name(name: object, file: Path | None = None) -> None:
+    """Raise `InputError` about a name that cannot be shown everywhere, or that is one of a family that is built in."""
+    if not isinstance(name, str) or not NAME.fullmatch(name):
+        message = "must begin with a letter or digit and have at most 40 letters, digits, blanks and . _ + -"
+        raise InputError(message, file=file, field="name of a family", value=name)
+    if name in KNOWN:
+        raise InputError("is the name of a family that is built in", file=file, field="name of a family", value=name)
+
+
 def scene_family(path: str | Path) -> SceneFamily:
     """A scene file as a family that has the file's name.
 
     Raises:
       InputError: what is wrong with the file.
     """
+    check_name(Path(path).stem, Path(path))
     refuse_terrain(load_scene(path)[1], "a study")
     text = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
     return _scene_family(Path(path), text)

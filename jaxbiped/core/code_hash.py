@@ -2,81 +2,111 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
+import re
 import types
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jax
 import numpy as np
 
 OURS = "jaxbiped"
+ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
+PLAIN = bool | int | float | complex | str | bytes | None
 
 
 def component_hash(component: Any) -> str:
     """Twelve hex digits of a component's type, code, static fields and numbers.
 
     The code is the whole text of the modules that its classes and functions are from, where there is a file, since
-    they call what is beside them; else, as in a notebook, their own text. What they import from elsewhere is not
-    covered.
+    they call what is beside them; else, as in a notebook, their own text. What functions hold in closures, defaults and
+    `functools.partial` counts. What they import from elsewhere is not covered.
     """
     made = hashlib.sha256()
-    for part in (type(component), *functions_in(component)):
-        for name, text in sources(part):
-            made.update(f"{name}\n{text}\n".encode())
-    made.update(type(component).__qualname__.encode())
-    for name, field in getattr(component, "__dataclass_fields__", {}).items():
-        value = getattr(component, name)
-        if field.metadata.get("static", False):
-            made.update(f"{name}={named(value)}\n".encode())
-        elif not field.metadata.get("derived", False):
-            for leaf in map(np.asarray, jax.tree.leaves(value)):
-                made.update(f"{name} {leaf.dtype} {leaf.shape}".encode() + leaf.tobytes())
+    for part in parts(component, set()):
+        made.update(part.encode() + b"\n")
     return made.hexdigest()[:12]
 
 
-def named(value: Any) -> str:
-    """A static value without the address that it has in this process."""
-    if isinstance(value, types.FunctionType | types.MethodType | type):
-        return f"{value.__module__}.{value.__qualname__}"
-    return repr(value) if type(value).__repr__ is not object.__repr__ else type(value).__qualname__
+def parts(value: Any, seen: set[int]) -> Iterator[str]:
+    """Texts that change with a value, its code or what it holds, and that are the same in every process."""
+    if isinstance(value, PLAIN):
+        yield repr(value)
+        return
+    if id(value) in seen:
+        return
+    seen.add(id(value))
+    if isinstance(value, types.ModuleType):
+        yield value.__name__
+    elif isinstance(value, np.ndarray | np.generic | jax.Array) and np.asarray(value).dtype != object:
+        array = np.asarray(value)
+        yield f"{array.dtype} {array.shape} {array.tobytes().hex()}"
+    elif isinstance(value, Mapping):
+        for key in sorted(value, key=repr):
+            yield from parts(key, seen)
+            yield from parts(value[key], seen)
+    elif isinstance(value, tuple | list | set | frozenset):
+        yield type(value).__name__
+        for item in sorted(value, key=repr) if isinstance(value, set | frozenset) else value:
+            yield from parts(item, seen)
+    elif isinstance(value, type):
+        yield from sources(value)
+    elif isinstance(value, types.FunctionType):
+        yield from sources(value)
+        yield from parts([*cells(value), value.__defaults__, value.__kwdefaults__], seen)
+    elif isinstance(value, types.MethodType):
+        yield from parts([value.__func__, value.__self__], seen)
+    elif isinstance(value, functools.partial):
+        yield from parts([value.func, value.args, value.keywords], seen)
+    elif inner := getattr(value, "__wrapped__", None) or getattr(value, "py_func", None):  # of jax.jit and Numba
+        yield from parts(inner, seen)
+    else:
+        yield from sources(type(value))
+        known = getattr(value, "__dataclass_fields__", None)
+        held = getattr(value, "__dict__", {}) if known is None else {
+            name: getattr(value, name) for name, field in known.items() if not field.metadata.get("derived", False)
+        }  # fmt: skip
+        if held:
+            yield from parts(held, seen)
+        else:
+            yield ADDRESS.sub("", repr(value))
 
 
-def functions_in(component: Any) -> list[Any]:
-    """The functions among its fields, and those that they hold in closures and defaults."""
-    fields = getattr(component, "__dataclass_fields__", {})
-    found, waiting = [], [getattr(component, name) for name in fields]
-    while waiting:
-        value = waiting.pop()
-        value = getattr(value, "__func__", value)
-        if isinstance(value, types.FunctionType) and value not in found:
-            found.append(value)
-            waiting += [cell.cell_contents for cell in value.__closure__ or ()] + list(value.__defaults__ or ())
-    return found
+def cells(function: types.FunctionType) -> list[Any]:
+    """What a function holds from around it."""
+    held = []
+    for cell in function.__closure__ or ():
+        try:
+            held.append(cell.cell_contents)
+        except ValueError:  # not yet filled
+            held.append(None)
+    return held
 
 
-def sources(thing: Any) -> list[tuple[str, str]]:
-    """The text of each module that a class with its bases, or a function, is from; ours are left out."""
+def sources(thing: Any) -> Iterator[str]:
+    """The name of a class with its bases, or of a function, and the text of the modules they are from but for ours."""
     classes = inspect.getmro(thing) if isinstance(thing, type) else (thing,)
-    texts = []
     for item in classes:
         module = getattr(item, "__module__", "") or ""
-        if module.partition(".")[0] == OURS or module == "builtins":
+        yield f"{module if module != '__main__' else ''} {item.__qualname__}"
+        if module.partition(".")[0] in (OURS, "builtins"):
             continue
         try:
-            texts.append((module, inspect.getsource(inspect.getmodule(item))))
+            yield inspect.getsource(inspect.getmodule(item))
             continue
         except (OSError, TypeError):
             pass
         try:
-            texts.append((item.__qualname__, inspect.getsource(item)))
+            yield inspect.getsource(item)
         except (OSError, TypeError):
-            texts.append((item.__qualname__, compiled(item)))
-    return texts
+            functions = [item] if isinstance(item, types.FunctionType) else vars(item).values()
+            yield from (compiled(f.__code__) for f in functions if isinstance(f, types.FunctionType))
 
 
-def compiled(item: Any) -> str:
+def compiled(code: types.CodeType) -> str:
     """What code that has no text is compiled to."""
-    functions = [item] if isinstance(item, types.FunctionType) else vars(item).values()
-    codes = [f.__code__ for f in functions if isinstance(f, types.FunctionType)]
-    return "\n".join(f"{code.co_code.hex()} {code.co_consts!r} {code.co_names!r}" for code in codes)
+    constants = [compiled(item) if isinstance(item, types.CodeType) else repr(item) for item in code.co_consts]
+    return f"{code.co_code.hex()} {constants} {code.co_names}"

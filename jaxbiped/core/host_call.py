@@ -90,7 +90,9 @@ def handler(address):
             return None
     try:
         number, *arguments = map(array, words(frame[FRAME_ARGUMENTS], frame[FRAME_ARGUMENT_COUNT]))
-        outs = map(array, words(frame[FRAME_RESULTS], frame[FRAME_RESULT_COUNT]))
+        outs = [array(buffer) for buffer in words(frame[FRAME_RESULTS], frame[FRAME_RESULT_COUNT])]
+        for out in outs:
+            out[...] = 0  # what is left where the function fails
         for out, made in zip(outs, FUNCTIONS[int(number)](*arguments), strict=True):
             out[...] = made
     except BaseException:  # there is nobody to catch it

@@ -39,7 +39,7 @@ class Registry(Generic[T]):
           InputError: a name that is taken by something else, unless it is to be replaced.
         """
         taken = self.held.get(name)
-        if taken is not None and taken != thing and not replace:
+        if taken is not None and taken is not thing and not replace and not is_equal(taken, thing):
             raise InputError(f"is taken; two {self.kind} entries cannot have one name", field="name", value=name)
         self.held[name] = thing
         return thing
@@ -83,6 +83,14 @@ class Registry(Generic[T]):
     def entry_points(self) -> Iterator[metadata.EntryPoint]:
         """What other packages offer."""
         yield from metadata.entry_points(group=self.group)
+
+
+def is_equal(one: object, other: object) -> bool:
+    """Whether two entries are the same; those that cannot be compared, as with fields that are arrays, are not."""
+    try:
+        return bool(one == other)
+    except (TypeError, ValueError):
+        return False
 
 
 STRATEGIES: Registry = Registry("strategy", "jaxbiped.planners")  # filled by `mission.strategies`

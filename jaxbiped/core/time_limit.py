@@ -65,10 +65,8 @@ def within(seconds: float | int, function: Callable, *arguments: Any) -> Any:
             for _ in range(3):
                 time.sleep(0)
             raise TimeLimit from None
-    except TimeLimit:
+    finally:
         CALLS.pop(me, None)
-        raise
-    CALLS.pop(me, None)
     if error is not None:
         raise error
     if time.monotonic() > call.end:
@@ -79,8 +77,9 @@ def within(seconds: float | int, function: Callable, *arguments: Any) -> Any:
 def begin_to_watch() -> None:
     """See that a watcher is awake."""
     if not (WATCHER and WATCHER[0].is_alive()):
-        WATCHER[:] = [threading.Thread(target=watch, daemon=True, name="jaxbiped time limits")]
-        WATCHER[0].start()
+        thread = threading.Thread(target=watch, daemon=True, name="jaxbiped time limits")
+        WATCHER[:] = [thread]  # two of them, begun at once, do no harm
+        thread.start()
     if RESTING[0]:
         WAKE.put(None)
 

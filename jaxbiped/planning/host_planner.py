@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import sys
 import threading
 import time
@@ -55,6 +56,10 @@ class HostPlanner(Planner):
     def __post_init__(self):
         if not callable(self.function):
             raise InputError("must be a function", field="HostPlanner", value=self.function)
+        try:
+            hash(self.function)
+        except TypeError:
+            raise InputError("its function cannot be hashed", field="HostPlanner") from None
         if not 0 < self.limit < 1e6:
             raise InputError("must be above 0 s", field="HostPlanner: limit", value=self.limit)
         object.__setattr__(self, "number", np.int32(number_of(self.function, self.limit)))
@@ -131,7 +136,7 @@ def answer(classes, levels, start, goal, costs, rules, active, numbers):
             try:
                 found, cost[k] = read_way(way, grid, levels[k], start[k], goal[k], own, cutting)
                 moves[k, : min(length, len(found))] = found[:length]
-            except ValueError as error:
+            except Exception as error:  # also of what it returned, when that is made an array
                 fault[k] = FAILED
                 tell(function, str(error))
     return moves, cost, seconds, fault
@@ -144,7 +149,10 @@ def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs
         return FINE, within(limit, function, classes, levels, start, goal, costs)
     except TimeLimit:
         return TOO_SLOW, None
-    except Exception as error:
+    except KeyboardInterrupt:  # of the person, not of the function
+        _thread.interrupt_main()
+        return FAILED, None
+    except BaseException as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         tell(function, f"{type(error).__name__}: {error} ({place.name}, line {place.lineno})")
         return FAILED, None

@@ -85,6 +85,7 @@ class Planner:
     def plan_batch(self, problem: Problem) -> Route:
         """The routes of a batch [B]; the leaves of the planner have that axis, too."""
         route = jax.vmap(type(self).plan)(self, problem)
+        check_route(route, problem.state, type(self).__name__)
         return replace(route, fault=faults(problem, route, self))
 
     def whole_way(self, problem: Problem, route: Route) -> Int8[Array, "B n"]:
@@ -189,6 +190,17 @@ def cost_along(
 
     (_, total), _ = jax.lax.scan(step, (start_ij, jnp.zeros(edges.shape[0])), directions.T)
     return jnp.where(valid, total, jnp.nan)
+
+
+def check_route(route: Any, given: Any, name: str) -> None:
+    """Raise `InputError` unless a planner returned a route, with a state like the one that it was given."""
+    if not isinstance(route, Route):
+        raise InputError(f"plan must return a Route, not {type(route).__name__}", field=name)
+    wanted, left = (jax.tree.map(lambda leaf: (jnp.shape(leaf), jnp.asarray(leaf).dtype.name), state)
+                   for state in (given, route.state))  # fmt: skip
+    if wanted != left:
+        message = f"a route's state must be as initial_state says, {wanted}, not {left} (shapes with the batch's axis)"
+        raise InputError(message, field=name)
 
 
 def faults(problem: Problem, route: Route, planner: Planner) -> Int8[Array, "B"]:

@@ -20,7 +20,7 @@ from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.comparison import paired
-from jaxbiped.study.components import hash_of
+from jaxbiped.study.components import FAMILY, hash_of
 from jaxbiped.study.evaluate import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
 from jaxbiped.study.runner import check_mission, play_one, seeing
@@ -118,9 +118,7 @@ def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -
     if name not in own:
         message = "is not built in: its missions can be played again only by a program that gives it again"
         raise InputError(message, field="strategy", value=name)
-    known = manifest.config.get("components", {})
-    hashes = [value for place, value in known.items() if name in (place, place.rpartition(":")[2])]
-    if hash_of(own[name]) not in hashes:
+    if hash_of(own[name]) != manifest.config.get("components", {}).get(name):
         raise InputError("has other code or other numbers than in the study", field="strategy", value=name)
     return own[name]
 
@@ -133,8 +131,8 @@ def families_again(manifest: Manifest, names: Sequence[str]) -> tuple[str | OwnF
             message = "is not built in: its arenas can be drawn again only by a program that registers it"
             raise InputError(message, field="families", value=name)
         found.append(find_family(name))
-        hash_then = manifest.config.get("components", {}).get(name)
-        if not isinstance(found[-1], str) and found[-1].digest() != hash_then:
+        hashes = manifest.config.get("components", {})
+        if not isinstance(found[-1], str) and found[-1].digest() != hashes.get(f"{FAMILY} {found[-1].name}"):
             raise InputError("is not what it was in the study", field="families", value=name)
     return tuple(found)
 

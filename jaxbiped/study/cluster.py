@@ -27,14 +27,17 @@ from distributed.core import rpc
 from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 
+from jaxbiped.core.registry import PLACE
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
 from jaxbiped.mission.queue import Tally
+from jaxbiped.planning.host_planner import HostPlanner
 from jaxbiped.study import evaluate, worker
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress
 from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
+from jaxbiped.study.names import KNOWN
 from jaxbiped.study.worker import Compute
 
 ANSWER = 5.0  # [s] for the scheduler to answer
@@ -93,6 +96,7 @@ class Cluster:
         groups = groups_of(config, points)
         left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
         total = sum(shard.count * len(groups[shard.group].population_of) for shard in left)
+        refuse_own(config, groups)
         board, topic = Board(on_progress, total), f"jaxbiped-{uuid.uuid4()}"
         todo = iter(left)
         running: dict[Future, Shard] = {}
@@ -200,6 +204,18 @@ class Board:
         whole = sum(list(self.tallies.values()), Tally(0, 0))
         if self.on_progress:
             self.on_progress(Progress(whole.ended, whole.reached, self.total))
+
+
+def refuse_own(config: StudyConfig, groups: Sequence[Group]) -> None:
+    """Raise `InputError` about what only this process has, and no worker could find."""
+    for group in groups:
+        if isinstance(group.settings.planner, HostPlanner):
+            message = "is a function of NumPy arrays, which runs in this process alone: no --scheduler, no --workers"
+            raise InputError(message, field="strategies", value=group.strategies[0])
+    for name in config.families:
+        if name not in KNOWN and not name.endswith(".toml") and not PLACE.fullmatch(name):
+            message = "is registered in this process alone; name it package.module:name for workers to find"
+            raise InputError(message, field="families", value=name)
 
 
 @contextlib.contextmanager

@@ -10,6 +10,8 @@ from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.schema import STRATEGIES
 
+FAMILY = "family"  # before the names of families
+
 C = TypeVar("C", bound=StudyConfig)
 
 
@@ -25,9 +27,10 @@ def fingerprinted(config: C) -> C:
     Raises:
       InputError: a strategy or family that is not known, or whose module or file cannot be used.
     """
-    made = {name: hash_of(find_strategy(name)) for name in config.strategies if name not in STRATEGIES}
+    own = [find_strategy(name) for name in config.strategies if name not in STRATEGIES]
+    made = {item.name: hash_of(item) for item in own}
     for name in config.families:
         family = find_family(name)
         if not isinstance(family, str):
-            made[name] = family.digest()
+            made[f"{FAMILY} {family.name}"] = family.digest()
     return config if made == config.components else config.model_copy(update={"components": made})

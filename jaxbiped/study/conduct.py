@@ -62,7 +62,7 @@ def conduct(
         judge = in_order(enough, parts=1 if swept else len(groups_of(config, points)))
         paths = store.shard_paths(results.folder) if enough is not never else []
         if not any(judge(store.shard_number(path), pl.read_parquet(path)) for path in paths):
-            for shard, frame in engine(config, on_progress, points=points, done=results.done()):
+            for shard, frame in engine(config, on_progress, points=points if swept else None, done=results.done()):
                 results.append(frame, shard.number, compile_time=compile_time())
                 if judge(shard.number, frame):
                     break

@@ -21,6 +21,7 @@ from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.names import MOVING
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,9 @@ def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
     for name in names:
         if names.count(name) > 1:
             raise InputError("two of them have this name", field="families", value=name)
+    moving = MOVING & set(names)
+    if moving and not all(isinstance(item, str) for item in found):
+        raise InputError("moves, and goes with families that are built in only", field="families", value=min(moving))
     area_of(found)
     return found
 
@@ -135,16 +139,17 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
 
 
 def numbers_of(planner: Planner | None) -> tuple[str, ...]:
-    """The fields of a planner that a sweep may change."""
+    """The fields of a planner that a sweep may change: those that hold one number each."""
     if planner is None or not is_dataclass(planner):
         return ()
-    fixed = ("static", "derived")
-    return tuple(f.name for f in fields(planner) if not any(f.metadata.get(word) for word in fixed))
+    names = [f.name for f in fields(planner) if not (f.metadata.get("static") or f.metadata.get("derived"))]
+    values = {name: np.asarray(getattr(planner, name)) for name in names}
+    return tuple(name for name, value in values.items() if value.ndim == 0 and value.dtype.kind in "iuf")
 
 
 def with_numbers(planner: Planner | None, numbers: Mapping[str, float]) -> Planner | None:
     """The planner with those of the numbers that it has."""
-    known = {name: type(getattr(planner, name))(numbers[name]) for name in numbers_of(planner) if name in numbers}
+    known = {name: float(numbers[name]) for name in numbers_of(planner) if name in numbers}
     return replace(planner, **known) if known else planner
 
 

@@ -45,7 +45,7 @@ def test_a_generator_is_a_family_among_others():
     rows = results.rows.sort("arena")
     assert rows["family"].to_list() == ["bump", "two_blocks"] * 6
     assert (rows.filter(pl.col("family") == "two_blocks")["code"] == "reached").all()
-    assert set(results.config["components"]) == {"two_blocks"}
+    assert set(results.config["components"]) == {"family two_blocks"}
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Hashes of what people bring: the same for the same, other for other code, numbers and closures, in any process."""
 
+import functools
 import subprocess
 import sys
 from dataclasses import dataclass, field, replace
@@ -38,7 +39,8 @@ import lab_hash as lab
 from jaxbiped.core.code_hash import component_hash
 from jaxbiped.planning.host_planner import HostPlanner
 for k in range(int(sys.argv[2])): HostPlanner(lab.made(k))
-print(component_hash(lab.Mine()), component_hash(HostPlanner(lab.straight)))
+from jaxbiped.arenas.source import Family
+print(component_hash(lab.Mine()), component_hash(HostPlanner(lab.straight)), Family("mine", lab.straight).digest())
 """
 
 
@@ -50,7 +52,7 @@ def printed(folder, before=0):
 def test_the_same_in_every_process_and_other_where_the_code_is(tmp_path):
     (tmp_path / "lab_hash.py").write_text(MODULE)
     first = printed(tmp_path)
-    assert printed(tmp_path, before=3) == first and len(set(first)) == 2
+    assert printed(tmp_path, before=3) == first and len(set(first)) == 3
     (tmp_path / "lab_hash.py").write_text(MODULE.replace("[start, goal]", "[goal, start]"))
     assert set(printed(tmp_path)).isdisjoint(first)
 
@@ -60,6 +62,26 @@ def test_the_same_in_every_process_and_other_where_the_code_is(tmp_path):
 class Mine(GridPlanner):
     clearance: float = 0.1
     kind: str = field(default="a", metadata={"static": True})
+
+
+def lab(power, *, scale=1.0):
+    return lambda *problem: power * scale
+
+
+class Callable:
+    def __init__(self, power):
+        self.power = power
+
+    def __call__(self, *problem):
+        return self.power
+
+
+def test_what_functions_hold_counts():
+    held = [lab(1), lab(2), lab(1, scale=2.0), functools.partial(lab, 1), functools.partial(lab, 2)]
+    held += [Callable(1), Callable(2), Callable(1).__call__, jax.jit(lab(1)), jax.jit(lab(2))]
+    hashes = [component_hash(HostPlanner(item)) for item in held]
+    assert len(set(hashes[:8])) == 8 and hashes[8] != hashes[9]
+    assert component_hash(HostPlanner(Callable(1))) == hashes[5] and component_hash(HostPlanner(lab(1))) == hashes[0]
 
 
 def test_numbers_and_static_fields_count():
