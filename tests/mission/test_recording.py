@@ -62,7 +62,7 @@ def test_what_is_written_is_read(tmp_path, log):
 
 
 def test_every_field_of_a_log_is_written():
-    ragged = {"action", "outlines", "landmarks", "plan", "points", "pictures", "voxels", "walk"}
+    ragged = {"action", "outlines", "landmarks", "plan", "points", "pictures", "voxels", "walk", "terrain"}
     assert {field.name for field in fields(MissionLog)} == {*room.WHOLE, *room.OPTIONAL, *room.NAMED, *ragged}
 
 
