@@ -15,6 +15,7 @@ from jaxbiped.report.svg import INK, LINE, inline, themed
 from jaxbiped.report.tables import Sheet
 from jaxbiped.report.words import OPEN
 from jaxbiped.study import ALL, CODES, Comparison
+from jaxbiped.study.schema import ordered_families
 
 WIDTH = 5.2  # [inch]
 NO_PLAN = "#BFC6CE"

@@ -73,7 +73,7 @@ def refused(capsys, *argv: str) -> str:
         (["run", SCENE, "--foot-placement", "perhaps"], ["--foot-placement", "perhaps", "False"]),
         (["compare", "--until-width", "0"], ["--until-width", "greater than 0"]),
         (["compare", "--until-width", "2"], ["until-width", "below 2 for success", "2.0"]),
-        (["compare", "--until-width", "0.1", "--first", "brave"], ["--first", "brave"]),
+        (["compare", "--until-width", "0.1", "--first", "brave"], ["first:", "brave", "floor_only"]),
         (["compare", "--strategies", "full", "--until-width", "0.1"], ["first", "needs another"]),
         (
             ["compare", "--strategies", "full", "floor_only", "--until-width", "1", "--second", "blind_stop"],

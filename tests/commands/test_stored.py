@@ -59,7 +59,7 @@ def test_two_folders(here, capsys):
         (["r", "nowhere"], ["nowhere", "no such results folder"]),
         (["r", "other"], ["other", "seeds differ", "0 in r, 7 here"]),
         (["r", "r", "r"], ["folders", "at most 2"]),
-        (["r", "--first", "brave"], ["--first", "brave", "floor_only"]),
+        (["r", "--first", "brave"], ["first:", "brave", "floor_only"]),
         (["r", "--first", "blind_stop"], ["r: first", "must be one of full, bump_aware, floor_only", "blind_stop"]),
         (["r", "--first", "full", "--second", "full"], ["must differ from the first side"]),
         (["r", "--second-point", "1"], ["r: second-point", "there is one point, 0"]),

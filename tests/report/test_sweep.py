@@ -15,7 +15,7 @@ from jaxbiped.report.sweep import write_sweep_report
 from jaxbiped.report.sweep_figures import sweep_figure
 from jaxbiped.study import read_points, store
 from jaxbiped.study.conduct import conduct, table
-from jaxbiped.study.groups import group_points, shards
+from jaxbiped.study.groups import group_points, only_point, shards
 from jaxbiped.study.sweep import SweepConfig
 from tests.study.synthetic import rows
 
@@ -32,7 +32,7 @@ def made_up(config, on_progress=None, *, points, done):
             rows(config.arenas, seed=p.index % 5, strategies=config.strategies).with_columns(
                 point=pl.lit(p.index, pl.Int32)
             )
-            for p in points
+            for p in points or only_point(config)
         ]
         inside = pl.col("arena").is_between(shard.first, shard.first + shard.count - 1)
         yield shard, pl.concat(frames).filter(inside)
