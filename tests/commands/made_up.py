@@ -59,7 +59,7 @@ def right_lengths(here, monkeypatch):
 
 def a_mission(here, monkeypatch):
     played = Mission(Code.REACHED, 0.3, 104.0, 5, (), mission())
-    monkeypatch.setattr(run, "run_logged", lambda *_, **__: played)
+    monkeypatch.setattr(run, "play_one", lambda *_, **__: played)
 
 
 def a_study(module, points):

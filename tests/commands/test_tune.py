@@ -3,6 +3,7 @@
 import errno
 import json
 import tomllib
+from dataclasses import replace
 
 import jax
 import numpy as np
@@ -61,7 +62,9 @@ def test_tunes_writes_and_the_costs_can_be_used(here, small, capsys):
     vectors[2, 1:] = [9.0, 9.0, 9.0, 0.1]
     together = play(vectors, index)
     assert together.code.shape == (3, 5)
-    equal(jax.tree.map(lambda leaf: leaf[0], together), jax.tree.map(lambda leaf: leaf[1], together))  # scaled costs
+    first, second = (jax.tree.map(lambda leaf: leaf[k], together) for k in (0, 1))  # costs, and thrice those
+    np.testing.assert_allclose(second.planned.cost, 3 * first.planned.cost, rtol=1e-6)
+    equal(first, replace(second, planned=replace(second.planned, cost=first.planned.cost)))
     equal(jax.tree.map(lambda leaf: leaf[:, 1], together), jax.tree.map(lambda leaf: leaf[:, 3], together))
     equal(jax.tree.map(lambda leaf: leaf[2:, 4:], together), play(vectors[2:], index[4:]))
     assert np.any(together.time[0] != together.time[2])
