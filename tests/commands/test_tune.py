@@ -62,7 +62,7 @@ def test_tunes_writes_and_the_costs_can_be_used(here, small, capsys):
     vectors[2, 1:] = [9.0, 9.0, 9.0, 0.1]
     together = play(vectors, index)
     assert together.code.shape == (3, 5)
-    first, second = (jax.tree.map(lambda leaf: leaf[k], together) for k in (0, 1))  # costs, and thrice those
+    first, second = (jax.tree.map(lambda leaf, k=k: leaf[k], together) for k in (0, 1))  # costs, and thrice those
     np.testing.assert_allclose(second.planned.cost, 3 * first.planned.cost, rtol=1e-6)
     equal(first, replace(second, planned=replace(second.planned, cost=first.planned.cost)))
     equal(jax.tree.map(lambda leaf: leaf[:, 1], together), jax.tree.map(lambda leaf: leaf[:, 3], together))
