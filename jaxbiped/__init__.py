@@ -26,6 +26,7 @@ lazy_package(
         "mapping.class_grid": "ClassGrid",
         "mapping.grid": "Cell",
         "mission.config": "CostConfig LimitConfig MissionConfig",
+        "mission.metric": "Metric MissionEnd Step",
         "mission.outcome": "Code",
         "mission.strategies": "Strategy",
         "motion.config": "DurationConfig RobotConfig",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,12 +14,15 @@ from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.arenas.source import Family, as_family
 from jaxbiped.config import input_error
 from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
+from jaxbiped.core.registry import METRICS as METRICS_OWN
 from jaxbiped.errors import InputError
+from jaxbiped.mission.metric import Metric, as_metric
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import STRATEGIES, Strategy, as_strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.names import METRICS
 from jaxbiped.study.schema import FAMILIES
 from jaxbiped.study.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.sweep import SweepConfig
@@ -67,6 +71,7 @@ class Study:
         of NumPy arrays (see `HostPlanner`, under their own name).
       mission: robot, sensor, executor, costs and so on, the same for all strategies.
       seed: of the arenas and of all noise.
+      metrics: columns beside those that all rows have: names, or metrics of your own, under the name of their class.
 
     Raises:
       InputError: a name that is not known, two strategies of one name, a number out of its range.
@@ -76,6 +81,7 @@ class Study:
     strategies: Sequence[str | Strategy | Planner | Any] = BUILT_IN
     mission: MissionConfig = field(default_factory=MissionConfig)
     seed: int = 0
+    metrics: Sequence[str | Metric] = METRICS
     shard: int = 1024  # arenas that are computed, and stored, together
     own: tuple[Strategy, ...] = field(init=False, repr=False)
 
@@ -98,6 +104,7 @@ class Study:
             "arenas": self.arenas.count,
             "families": tuple(registered(item) for item in self.arenas.families),
             "strategies": tuple(item if isinstance(item, str) else named(item).name for item in self.strategies),
+            "metrics": tuple(map(measured, self.metrics)),
             "population": self.arenas.population.model_dump(),
             "mission": self.mission.model_dump(),
             "shard": self.shard,
@@ -117,7 +124,7 @@ class Study:
 
         config = load(StudyConfig, path)
         arenas = RandomArenas(config.families, config.arenas, config.population)
-        return cls(arenas, config.strategies, config.mission, config.seed, config.shard)
+        return cls(arenas, config.strategies, config.mission, config.seed, config.metrics, config.shard)
 
 
 def registered(family: Any) -> str:
@@ -127,6 +134,15 @@ def registered(family: Any) -> str:
     made = family if isinstance(family, Family) else as_family(family, getattr(family, "__name__", str(family)))
     FAMILIES_OWN.add(made.name, made, replace=True)
     return made.name
+
+
+def measured(metric: str | Metric) -> str:
+    """The name of a metric in the registry: of one that is given as an object, its class's in small letters with _."""
+    if isinstance(metric, str):
+        return metric
+    name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", type(metric).__name__).lower()
+    METRICS_OWN.add(name, as_metric(metric, name), replace=name not in METRICS)
+    return name
 
 
 def named(thing: Any) -> Strategy:

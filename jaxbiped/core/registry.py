@@ -95,6 +95,7 @@ def is_equal(one: object, other: object) -> bool:
 
 STRATEGIES: Registry = Registry("strategy", "jaxbiped.planners")  # filled by `mission.strategies`
 FAMILIES: Registry = Registry("family", "jaxbiped.arenas")  # of arenas that are not built in
+METRICS: Registry = Registry("metric", "jaxbiped.metrics")  # filled by `mission.metrics`
 
 
 def load(place: str, kind: str) -> object:

@@ -17,6 +17,7 @@ from jaxbiped.mission.encounter import met
 from jaxbiped.mission.executors import EXECUTORS, Execution
 from jaxbiped.mission.footing import walked
 from jaxbiped.mission.localising import carried_on, unmarked
+from jaxbiped.mission.metric import Step, updated
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
@@ -148,7 +149,7 @@ def conclude(
     astray = jnp.hypot(belief.pose.x - pose.x, belief.pose.y - pose.y)
     sane = jnp.isfinite(away + time + pose.yaw + belief.pose.x + belief.pose.y + belief.pose.yaw)
     code = jnp.where(sane, code, Code.INVALID).astype(jnp.int32)
-    world = World(
+    after = World(
         pose=pose,
         squat=jnp.where(stays, world.squat, command.squat),
         distance=world.distance + jnp.where(stays, 0.0, executed.distance),
@@ -162,5 +163,8 @@ def conclude(
         before=None if world.before is None else world.pose,
         planned=mind.planned,
     )
+    if settings.metrics:
+        step = Step(arena, world, after, command, ~stays, settings)
+        after = replace(after, metrics=updated(settings.metrics, world.metrics, step))
     mind = carried_on(walked(mind, command, executed.moved, executed.variances), executed.moved, executed.variances)
-    return world, replace(mind, belief=belief, since=settings.durations.measure + acted)
+    return after, replace(mind, belief=belief, since=settings.durations.measure + acted)

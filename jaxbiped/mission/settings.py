@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -24,6 +25,7 @@ from jaxbiped.mission.config import CostConfig as CostConfig
 from jaxbiped.mission.config import LimitConfig as LimitConfig
 from jaxbiped.mission.config import MissionConfig as MissionConfig
 from jaxbiped.mission.library import Library, load_library
+from jaxbiped.mission.metric import Metric
 from jaxbiped.mission.strategies import Strategy, StrategyFlags, find_strategy
 from jaxbiped.motion.primitives import Durations
 from jaxbiped.motion.robot import Footing
@@ -70,6 +72,7 @@ class Settings:
     library: Library
     footing: Footing
     limits: Limits
+    metrics: tuple[Metric, ...] = ()  # that rows shall have beside what every mission has
 
 
 @dataclass(frozen=True)
@@ -100,12 +103,13 @@ def program(config: MissionConfig, size_xy: tuple[float, float], terrain: Height
     )
 
 
+C = TypeVar("C")
 PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # of strategies that bring none of their own
 
 
-def traced_planner(planner: Planner) -> Planner:
-    """A planner with its numbers as arrays of the types that programs compute with."""
-    return jax.tree.map(lambda leaf: np.asarray(leaf, jax.dtypes.canonicalize_dtype(np.asarray(leaf).dtype)), planner)
+def traced_component(component: C) -> C:
+    """A planner, say, with its numbers as arrays of the types that programs compute with."""
+    return jax.tree.map(lambda leaf: np.asarray(leaf, jax.dtypes.canonicalize_dtype(np.asarray(leaf).dtype)), component)
 
 
 def settings_of(config: MissionConfig, strategy: str | Strategy) -> Settings:
@@ -115,7 +119,7 @@ def settings_of(config: MissionConfig, strategy: str | Strategy) -> Settings:
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
     return Settings(
         strategy=strategy.flags(config.corner_cutting),
-        planner=PLANNERS[config.planner] if strategy.planner is None else traced_planner(strategy.planner),
+        planner=PLANNERS[config.planner] if strategy.planner is None else traced_component(strategy.planner),
         costs=numbers(config.costs),
         durations=numbers(config.durations),
         body=numbers(config.robot, "body"),

@@ -35,6 +35,7 @@ from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
+from jaxbiped.study.metric_columns import metric_columns
 from jaxbiped.study.runner import batch_driver
 from jaxbiped.study.schema import SCHEMA
 
@@ -103,7 +104,8 @@ def compute(
         )
     batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
     plan = plan_all(batch, group, size)
-    return frame(np.arange(shard.first, shard.first + shard.count), batch, group, families, result, plan)
+    rows = frame(np.arange(shard.first, shard.first + shard.count), batch, group, families, result, plan)
+    return rows.with_columns(**metric_columns(batch, group, result, plan, size))
 
 
 @with_own_settings

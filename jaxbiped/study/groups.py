@@ -15,13 +15,15 @@ from jaxbiped.arenas.source import OwnFamily, area_of, find_family, name_of
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.footwork import WalkConfig
+from jaxbiped.mission.metric import Metric, column_of, find_metric
 from jaxbiped.mission.queue import stack
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program, traced_planner
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program, traced_component
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.names import MOVING
+from jaxbiped.study.schema import SCHEMA
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class Group:
     settings: Settings  # [P * S], strategy by strategy within a point
     populations: Population | None  # [U], those that differ; None: nothing is fixed in any
     population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
+    metrics: tuple[str, ...] = ()  # columns of the metrics of the settings
 
 
 @dataclass(frozen=True)
@@ -95,10 +98,27 @@ def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
     return found
 
 
+def metrics_of(config: StudyConfig) -> dict[str, Metric]:
+    """The metrics of a study by their columns, in its order.
+
+    Raises:
+      InputError: a name that is not known, a module that cannot be imported, two of one column, or a column that all
+        rows have.
+    """
+    found: dict[str, Metric] = {}
+    for name in config.metrics:
+        column = column_of(name)
+        if column in found or column in SCHEMA:
+            raise InputError("is a column that rows have already", field="metrics", value=name)
+        found[column] = find_metric(name)
+    return found
+
+
 def group_points(
     points: Iterable[Point],
     strategies: Sequence[Strategy | str],
     area: tuple[float, float] = (SIZE_X, SIZE_Y),
+    metrics: Mapping[str, Metric] | None = None,
 ) -> tuple[Group, ...]:
     """Points by what sets array shapes and code paths (`mission.program`), in the order of their first.
 
@@ -106,6 +126,7 @@ def group_points(
 
     Args:
       area: [m] of all arenas.
+      metrics: by their columns.
 
     Raises:
       InputError: a point whose grid does not fit the area.
@@ -126,7 +147,9 @@ def group_points(
     kinds: dict[tuple, list[Strategy]] = {}
     for item in strategies:
         kinds.setdefault(kind_of(item), []).append(item)
-    return tuple(group(*key, members, kind) for key, members in together.items() for kind in kinds.values())
+    return tuple(
+        group(*key, members, kind, metrics or {}) for key, members in together.items() for kind in kinds.values()
+    )
 
 
 def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tuple[Group, ...]:
@@ -135,7 +158,8 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
     Raises:
       InputError: strategies, families or points that do not go together.
     """
-    return group_points(points or only_point(config), strategies_of(config), area_of(families_of(config)))
+    area = area_of(families_of(config))
+    return group_points(points or only_point(config), strategies_of(config), area, metrics_of(config))
 
 
 def numbers_of(planner: Planner | None) -> tuple[str, ...]:
@@ -165,16 +189,17 @@ def group(
     camera: CameraConfig | None,
     points: Sequence[Point],
     strategies: Sequence[Strategy],
+    metrics: Mapping[str, Metric],
 ) -> Group:
     """The points of one program."""
-    settings = []
+    settings, measured = [], tuple(traced_component(metric) for metric in metrics.values())
     for point in points:
         first = point.mission.settings(strategies[0])
         cutting = point.mission.corner_cutting
         for item in strategies:
             own = with_numbers(item.planner, point.planner)
-            planner = first.planner if own is None else traced_planner(own)
-            settings.append(replace(first, strategy=item.flags(cutting), planner=planner))
+            planner = first.planner if own is None else traced_component(own)
+            settings.append(replace(first, strategy=item.flags(cutting), planner=planner, metrics=measured))
     different = list(dict.fromkeys(point.population for point in points))
     drawn = different == [PopulationConfig()]
     return Group(
@@ -186,6 +211,7 @@ def group(
         settings=stack(settings),
         populations=None if drawn else stack([population.traced() for population in different]),
         population_of=np.repeat([different.index(point.population) for point in points], len(strategies)),
+        metrics=tuple(metrics),
     )
 
 
