@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,15 +9,16 @@ from typing import Any
 
 import pydantic
 
+from jaxbiped.api.register import family_name, named, register
 from jaxbiped.arenas.population import PopulationConfig
-from jaxbiped.arenas.source import Family, as_family
+from jaxbiped.arenas.source import Family
 from jaxbiped.config import input_error
-from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
-from jaxbiped.core.registry import METRICS as METRICS_OWN
 from jaxbiped.errors import InputError
-from jaxbiped.mission.metric import Metric, as_metric
+from jaxbiped.mission.execution import Executor
+from jaxbiped.mission.metric import Metric
+from jaxbiped.mission.sensors import Sensor
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.strategies import STRATEGIES, Strategy, as_strategy
+from jaxbiped.mission.strategies import STRATEGIES, Strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
@@ -72,6 +72,7 @@ class Study:
       mission: robot, sensor, executor, costs and so on, the same for all strategies.
       seed: of the arenas and of all noise.
       metrics: columns beside those that all rows have: names, or metrics of your own, under the name of their class.
+      sensor, executor: in place of the mission's: names, or objects of your own, under the name of their class.
 
     Raises:
       InputError: a name that is not known, two strategies of one name, a number out of its range.
@@ -82,6 +83,8 @@ class Study:
     mission: MissionConfig = field(default_factory=MissionConfig)
     seed: int = 0
     metrics: Sequence[str | Metric] = METRICS
+    sensor: str | Sensor | None = None
+    executor: str | Executor | None = None
     shard: int = 1024  # arenas that are computed, and stored, together
     own: tuple[Strategy, ...] = field(init=False, repr=False)
 
@@ -102,11 +105,11 @@ class Study:
         data = {
             "seed": self.seed,
             "arenas": self.arenas.count,
-            "families": tuple(registered(item) for item in self.arenas.families),
+            "families": tuple(map(family_name, self.arenas.families)),
             "strategies": tuple(item if isinstance(item, str) else named(item).name for item in self.strategies),
-            "metrics": tuple(map(measured, self.metrics)),
+            "metrics": tuple(register(item) if isinstance(item, Metric) else item for item in self.metrics),
             "population": self.arenas.population.model_dump(),
-            "mission": self.mission.model_dump(),
+            "mission": self.mission.model_dump() | self._seen_and_moved(),
             "shard": self.shard,
         }
         if axes is not None:
@@ -117,6 +120,11 @@ class Study:
             raise input_error(error) from None
         return fingerprinted(config)
 
+    def _seen_and_moved(self) -> dict[str, str]:
+        """Names of the sensor and the executor, where they are not the mission's."""
+        own = {"sensor": self.sensor, "executor": self.executor}
+        return {kind: item if isinstance(item, str) else register(item) for kind, item in own.items() if item}
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """The study of a TOML file, as `jaxbiped compare FILE` reads it."""
@@ -125,30 +133,3 @@ class Study:
         config = load(StudyConfig, path)
         arenas = RandomArenas(config.families, config.arenas, config.population)
         return cls(arenas, config.strategies, config.mission, config.seed, config.metrics, config.shard)
-
-
-def registered(family: Any) -> str:
-    """The name of a family in the registry."""
-    if isinstance(family, str | Path):
-        return str(family)
-    made = family if isinstance(family, Family) else as_family(family, getattr(family, "__name__", str(family)))
-    FAMILIES_OWN.add(made.name, made, replace=True)
-    return made.name
-
-
-def measured(metric: str | Metric) -> str:
-    """The name of a metric in the registry: of one that is given as an object, its class's in small letters with _."""
-    if isinstance(metric, str):
-        return metric
-    name = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", type(metric).__name__).lower()
-    METRICS_OWN.add(name, as_metric(metric, name), replace=name not in METRICS)
-    return name
-
-
-def named(thing: Any) -> Strategy:
-    """A strategy of something that stands for one, under its own name."""
-    if isinstance(thing, Strategy):
-        return thing
-    own = getattr(thing, "function", None) or thing
-    name = getattr(own, "__name__", None) or type(own).__name__
-    return as_strategy(thing, name)

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import pydantic
 
 from jaxbiped.config import Model
+from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
+from jaxbiped.core.registry import PLACE, Registry
+from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.config import MapConfig
 from jaxbiped.motion.biped import RobotModelConfig
@@ -28,9 +31,32 @@ SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinemati
 # stereo camera, as wide as the body, sweeps 12 cm to either side
 BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
 SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
+RENDERED = ("stereo",)  # sensors that measure on the host
+SENSORS, EXECUTORS = ("raycast", "oracle", *RENDERED), ("kinematic", "sampled", *SIMULATED)  # that are built in
 VISUAL = ("visual", "both")  # localisations that measure the motion between two views
 ICP = ("icp", "both")  # those that measure the pose by walls that were measured before
 
+
+def known_sensor(name: str) -> str:
+    """A name that is registered, or `package.module:name`, of which nothing is imported here."""
+    return known_component(name, SENSORS, SENSORS_OWN)
+
+
+def known_executor(name: str) -> str:
+    """The same of an executor."""
+    return known_component(name, EXECUTORS, EXECUTORS_OWN)
+
+
+def known_component(name: str, built_in: tuple[str, ...], registered: Registry) -> str:
+    """The name, where it may be that of a component."""
+    if not (name in built_in or registered.knows(name) or PLACE.fullmatch(name)):
+        known = ", ".join(dict.fromkeys([*built_in, *registered]))
+        raise ValueError(f"must be one of {known}, or package.module:name of your own {registered.kind}")
+    return name
+
+
+SensorName = Annotated[str, pydantic.AfterValidator(known_sensor)]
+ExecutorName = Annotated[str, pydantic.AfterValidator(known_executor)]
 
 # Bounded so that sums of costs along a path keep their differences in single precision.
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
@@ -100,15 +126,16 @@ class WalkConfig(Model):
 class MissionConfig(Model):
     """One kind of mission. Every default is the paper's value, or named where it is chosen."""
 
-    sensor: Literal["raycast", "oracle", "stereo"] = "raycast"
-    """`stereo`: pairs of pictures, rendered and matched on the host."""
+    sensor: SensorName = "raycast"
+    """raycast, oracle (knows all), stereo (pairs of pictures, rendered and matched on the host), or your own, as
+    package.module:name."""
     preset: str = "rendered"
     """How well the camera measures, the default of each number of `stereo` and `landmarks`: ideal, rendered, real, or a
     sensor file (.toml), as `jaxbiped fit-sensor` writes it, which says how many rays the camera has, too. What is given
     beside it wins; the rays need only divide the camera's size as it then is."""
-    executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
-    """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
-    MuJoCo's own batch or in MJX."""
+    executor: ExecutorName = "kinematic"
+    """kinematic, sampled (moves as simulated bipeds were measured to: `library`), native or mjx (simulated bipeds, in
+    MuJoCo's own batch or in MJX), or your own, as package.module:name."""
     localisation: Literal["landmarks", "odometry", "visual", "icp", "both"] = "landmarks"
     """How the robot knows where it stands: dead reckoning, corrected by landmarks, by nothing (`odometry`), by the
     motion that two views tell (`visual`), by walls measured before (`icp`), or by the last two. The paper has the

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from jaxbiped.core.component import check_component
 from jaxbiped.core.registry import METRICS
 from jaxbiped.errors import InputError
 
@@ -67,25 +68,10 @@ class Metric:
 
 def check_metric(metric: object, name: str) -> None:
     """Raise `InputError` unless an object can be a metric of this name inside a compiled program."""
-    where, kind = f"metric {name}", type(metric).__name__
     if not NAME.fullmatch(name):
         message = "must begin with a small letter and have at most 40 small letters, digits and _"
         raise InputError(message, field="name of a metric", value=name)
-    if not isinstance(metric, Metric):
-        raise InputError(f"must be a Metric, not {kind}", field=where)
-    leaves, structure = jax.tree.flatten(metric)
-    if len(leaves) == 1 and leaves[0] is metric:
-        raise InputError(f"{kind} is no pytree; decorate it with jax.tree_util.register_dataclass", field=where)
-    for leaf in leaves:
-        try:
-            jnp.asarray(leaf)
-        except TypeError:
-            message = f"{kind} holds a {type(leaf).__name__}; what is no number must be a static field"
-            raise InputError(message, field=where) from None
-    try:
-        hash(structure)
-    except TypeError:
-        raise InputError(f"{kind} has a static field that cannot be hashed", field=where) from None
+    check_component(metric, Metric, f"metric {name}")
 
 
 def as_metric(thing: object, name: str) -> Metric:
@@ -108,12 +94,12 @@ def find_metric(name: str) -> Metric:
     """
     from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
 
-    return METRICS.find(name, as_metric)
+    return METRICS.find(name, lambda thing, own: as_metric(thing, column_of(f":{own}")))
 
 
 def column_of(name: str) -> str:
-    """The column of a metric in rows: its name, without the module that it comes from."""
-    return name.rpartition(":")[2].lower() if ":" in name else name
+    """The column of a metric in rows: its name, without the module that it comes from; `slow_walk` of `SlowWalk`."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.rpartition(":")[2]).lower() if ":" in name else name
 
 
 def begun(metrics: tuple[Metric, ...], arena: Any, settings: Any) -> tuple:

@@ -1,4 +1,4 @@
-"""What people brought to a study: strategies, families and metrics that are not built in, and a hash of each."""
+"""What people brought to a study: its components that are not built in, and a hash of each."""
 
 from __future__ import annotations
 
@@ -6,12 +6,15 @@ from typing import TypeVar
 
 from jaxbiped.arenas.source import find_family
 from jaxbiped.core.code_hash import component_hash
+from jaxbiped.mission.config import EXECUTORS, SENSORS
+from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.metric import column_of, find_metric
+from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.names import METRICS, STRATEGIES
 
-FAMILY, METRIC = "family", "metric"  # before the names of families and of metrics
+FAMILY, METRIC, SENSOR, EXECUTOR = "family", "metric", "sensor", "executor"  # before the names of these
 
 C = TypeVar("C", bound=StudyConfig)
 
@@ -26,7 +29,7 @@ def fingerprinted(config: C) -> C:
     """The config with `components` filled in, so that its hash covers the code of what people brought.
 
     Raises:
-      InputError: a strategy, family or metric that is not known, or whose module or file cannot be used.
+      InputError: a component that is not known, or whose module or file cannot be used.
     """
     own = [find_strategy(name) for name in config.strategies if name not in STRATEGIES]
     made = {item.name: hash_of(item) for item in own}
@@ -37,4 +40,10 @@ def fingerprinted(config: C) -> C:
     for name in config.metrics:
         if name not in METRICS:
             made[f"{METRIC} {column_of(name)}"] = component_hash(find_metric(name))
+    for kind, name, built_in, find in (
+        (SENSOR, config.mission.sensor, SENSORS, find_sensor),
+        (EXECUTOR, config.mission.executor, EXECUTORS, find_executor),
+    ):
+        if name not in built_in:
+            made[f"{kind} {name}"] = component_hash(find(name))
     return config if made == config.components else config.model_copy(update={"components": made})

@@ -16,6 +16,8 @@ from jaxbiped.core.registry import STRATEGIES as REGISTERED
 from jaxbiped.mission.config import SIMULATED, MissionConfig
 from jaxbiped.study.names import FAMILIES, KNOWN, METRICS, MOVING, STRATEGIES
 
+OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # what the names of components' numbers begin with
+
 
 def known_family(name: str) -> str:
     """A family that is built in or registered, a scene file, or `package.module:name`; nothing is read or imported."""
@@ -64,9 +66,10 @@ class StudyConfig(Model):
     metrics: tuple[MetricName, ...] = METRICS
     """Columns beside those that all rows have: path efficiency (spl), the least distance from boxes (clearance), plans
     but the first (replans), the share of time spent measuring; or your own, as package.module:name."""
+    numbers: dict[str, float] = pydantic.Field(default_factory=dict)
+    """Of your own components, in place of their defaults: planner.clearance, sensor.reach or executor.slip, say."""
     components: Annotated[dict[str, str], tyro.conf.Fixed] = pydantic.Field(default_factory=dict)
-    """A hash of the code and the numbers of each strategy, family and metric that is not built in; filled in when the
-    study begins."""
+    """A hash of the code and the numbers of each component that is not built in; filled in when the study begins."""
     shard: Annotated[int, pydantic.Field(ge=1, le=65536)] = 1024
     """Arenas that are computed, and written, together."""
     population: PopulationConfig = PopulationConfig()
@@ -78,6 +81,9 @@ class StudyConfig(Model):
         for name in ("families", "strategies", "metrics"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
                 raise ValueError(f"{name} must be named once each")
+        for name in self.numbers:
+            if not (name.startswith(OF_COMPONENTS) and name.partition(".")[2].isidentifier()):
+                raise ValueError(f"numbers: {name} must be planner.<field>, sensor.<field> or executor.<field>")
         for name, family in FAMILY_OF.items():
             if getattr(self.population, name) is not None and family not in self.families:
                 raise ValueError(f"population.{name} needs the family {family}")

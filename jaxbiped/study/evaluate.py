@@ -35,7 +35,7 @@ from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
-from jaxbiped.study.metric_columns import metric_columns
+from jaxbiped.study.metric_columns import check_metrics, metric_columns
 from jaxbiped.study.runner import batch_driver
 from jaxbiped.study.schema import SCHEMA
 
@@ -98,6 +98,7 @@ def compute(
     index = shard.first + jnp.arange(size)
     families = tuple(map(find_family, config.families))
     batch, seeds = draw(jax.random.key(config.seed), index, families, group.populations)
+    check_metrics(batch, group, size)
     with batch_driver(group, workers) as play:
         result = play(
             batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of

@@ -10,9 +10,9 @@ import polars as pl
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.metric import MissionEnd, numbers_at_end
+from jaxbiped.mission.metric import MissionEnd, begun, numbers_at_end
 from jaxbiped.mission.oracle import OraclePlan
-from jaxbiped.mission.queue import Result
+from jaxbiped.mission.queue import Result, no_results
 from jaxbiped.mission.settings import Settings
 from jaxbiped.study.groups import Group
 
@@ -54,6 +54,22 @@ def metric_columns(batch: Arena, group: Group, result: Result, plan: OraclePlan,
             pl.when(pl.Series(valid & finite)).then(pl.col(name)).alias(name)
         )[name]  # fmt: skip
     return columns
+
+
+@with_own_settings
+def check_metrics(batch: Arena, group: Group, size: int) -> None:
+    """Look at what metrics give, before a mission is played for them; arguments as of `metric_columns`.
+
+    Raises:
+      InputError: a metric whose result is not one number and one truth value.
+    """
+    if group.metrics:
+        arenas = jax.tree.map(lambda leaf: leaf[:size], batch)
+        settings = jax.tree.map(lambda leaf: leaf[:1], group.settings)
+        one = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (arenas, settings))
+        states = jax.eval_shape(lambda arena, setting: begun(setting.metrics, arena, setting), *one)
+        plan = OraclePlan(np.zeros((1, size), bool), *(np.zeros((1, size), np.float32) for _ in range(2)))
+        jax.eval_shape(at_ends, arenas, settings, no_results(1, size, metrics=states), plan)
 
 
 @jax.jit

@@ -10,8 +10,10 @@ from jaxtyping import Array, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import WITH_TERRAIN, refuse_terrain
+from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.eyes import Eyes, eyes_for
 from jaxbiped.mission.queue import Result
+from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, program
 from jaxbiped.mission.stepped import Mission, Played, run_logged
 from jaxbiped.mission.strategies import Strategy
@@ -25,9 +27,15 @@ def program_for(config: MissionConfig, arena: Arena) -> Program:
       InputError: a pitch that does not divide it; terrain that the sensor or the executor does not know.
     """
     for kind, choice in (("sensor", config.sensor), ("executor", config.executor)):
-        if choice not in WITH_TERRAIN[kind]:
+        if not (choice in WITH_TERRAIN[kind] or knows_terrain(kind, choice)):
             refuse_terrain(arena, f"{kind} {choice}")
     return program(config, tuple(round(float(side), 6) for side in arena.size_xy), arena.terrain)
+
+
+def knows_terrain(kind: str, name: str) -> bool:
+    """Whether a sensor or an executor that somebody brought says so."""
+    component = find_sensor(name) if kind == "sensor" else find_executor(name)
+    return component is not None and component.on_terrain
 
 
 def check_mission(config: MissionConfig) -> None:
