@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import polars as pl
 
 from jaxbiped.arenas.population import PopulationConfig
@@ -23,6 +24,7 @@ from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.study.arena_kinds import kinds_of
 from jaxbiped.study.comparison import paired
 from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
 from jaxbiped.study.evaluate import draw
@@ -110,11 +112,17 @@ def play_again(
         same_component(manifest, kind, name, known)
     populations = None if population == PopulationConfig() else stack([population.traced()])
     families = families_again(manifest, families)
-    batch, seeds = draw(jax.random.key(manifest.seed), jnp.asarray(arenas), families, populations)
     check_mission(config)
-    each = [jax.tree.map(lambda leaf, k=k: leaf[k], batch) for k in range(len(arenas))]
+    key, played = jax.random.key(manifest.seed), {}
     with seeing(config) as eyes:
-        return [play_one(arena, config, again, seed, eyes=eyes) for arena, seed in zip(each, seeds, strict=True)]
+        for kind in kinds_of(families):
+            mine = np.array([k for k in arenas if k % kind.number in kind.places], int)
+            if len(mine):
+                batch, seeds = draw(key, jnp.asarray(mine), kind.families, populations, jnp.asarray(kind.turns(mine)))
+                for row, k in enumerate(mine):
+                    arena = jax.tree.map(lambda leaf, row=row: leaf[row], batch)
+                    played[int(k)] = play_one(arena, config, again, seeds[row], eyes=eyes)
+    return [played[int(k)] for k in arenas]
 
 
 def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -> Strategy:

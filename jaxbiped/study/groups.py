@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Int
 
-from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.population import Population, PopulationConfig
-from jaxbiped.arenas.source import OwnFamily, area_of, find_family, name_of
+from jaxbiped.arenas.source import OwnFamily, find_family, name_of
 from jaxbiped.core.component import kind_of, numbers_of, traced_component, with_numbers
 from jaxbiped.errors import InputError
 from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.metric import Metric, column_of, find_metric
+from jaxbiped.mission.program_for import program_for
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.sensors import find_sensor
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.study.arena_kinds import ANY, ArenaKind, kinds_of
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.names import MOVING
 from jaxbiped.study.schema import SCHEMA
@@ -42,6 +44,7 @@ class Point:
 class Group:
     """Points and strategies that differ in traced numbers alone: `P` points, `S` strategies, one compiled program."""
 
+    kind: ArenaKind
     static: Program
     walk: WalkConfig | None  # of simulated bipeds
     camera: CameraConfig | None  # of sensors that measure on the host
@@ -52,10 +55,14 @@ class Group:
     population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
     metrics: tuple[str, ...] = ()  # columns of the metrics of the settings
 
+    def rows(self, shard: Shard) -> int:
+        """How many a shard of this group has."""
+        return self.kind.count(shard.first, shard.count) * len(self.population_of)
+
 
 @dataclass(frozen=True)
 class Shard:
-    """A block of arenas under all points of a group: what one call computes, and one file holds."""
+    """A block of arenas, those of a group's kind, under all its points: what one call computes, and one file holds."""
 
     number: int
     group: int
@@ -95,7 +102,6 @@ def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
     moving = MOVING & set(names)
     if moving and not all(isinstance(item, str) for item in found):
         raise InputError("moves, and goes with families that are built in only", field="families", value=min(moving))
-    area_of(found)
     return found
 
 
@@ -118,7 +124,7 @@ def metrics_of(config: StudyConfig) -> dict[str, Metric]:
 def group_points(
     points: Iterable[Point],
     strategies: Sequence[Strategy | str],
-    area: tuple[float, float] = (SIZE_X, SIZE_Y),
+    kinds: Sequence[ArenaKind] = (ANY,),
     metrics: Mapping[str, Metric] | None = None,
     numbers: Mapping[str, float] | None = None,
 ) -> tuple[Group, ...]:
@@ -127,28 +133,31 @@ def group_points(
     Strategies whose planners are of different kinds are groups of their own.
 
     Args:
-      area: [m] of all arenas.
+      kinds: of arenas.
       metrics: by their columns.
       numbers: of components, by their dotted names, where a point has none of its own.
 
     Raises:
-      InputError: a point whose grid does not fit the area.
+      InputError: a point whose grid does not fit an area, or whose sensor or executor does not know a terrain.
     """
     strategies = [find_strategy(item) if isinstance(item, str) else item for item in strategies]
     points = tuple(replace(point, own={**(numbers or {}), **point.own}) for point in points)
     for point in points:
         check_numbers(point, strategies)
     together: dict[tuple, list[Point]] = {}
-    for point in points:
+    for place, point in itertools.product(range(len(kinds)), points):
         simulated = point.mission.executor in SIMULATED
         walk = point.mission.walk if simulated else None
         camera = point.mission.camera if point.mission.sensor in RENDERED else None
-        together.setdefault((program(point.mission, area), walk, camera), []).append(point)
-    kinds: dict[tuple, list[Strategy]] = {}
+        static = program_for(point.mission, kinds[place].size_xy, kinds[place].terrain)
+        together.setdefault((place, static, walk, camera), []).append(point)
+    by_planner: dict[tuple, list[Strategy]] = {}
     for item in strategies:
-        kinds.setdefault(kind_of(item.planner), []).append(item)
+        by_planner.setdefault(kind_of(item.planner), []).append(item)
     return tuple(
-        group(*key, members, kind, metrics or {}) for key, members in together.items() for kind in kinds.values()
+        group(kinds[place], *key, members, same, metrics or {})
+        for (place, *key), members in together.items()
+        for same in by_planner.values()
     )
 
 
@@ -178,11 +187,12 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
     Raises:
       InputError: strategies, families or points that do not go together.
     """
-    area = area_of(families_of(config))
-    return group_points(points or only_point(config), strategies_of(config), area, metrics_of(config), config.numbers)
+    kinds = kinds_of(families_of(config))
+    return group_points(points or only_point(config), strategies_of(config), kinds, metrics_of(config), config.numbers)
 
 
 def group(
+    kind: ArenaKind,
     static: Program,
     walk: WalkConfig | None,
     camera: CameraConfig | None,
@@ -205,6 +215,7 @@ def group(
     different = list(dict.fromkeys(point.population for point in points))
     drawn = different == [PopulationConfig()]
     return Group(
+        kind=kind,
         static=static,
         walk=walk,
         camera=camera,
