@@ -27,7 +27,7 @@ KINDS = (
 )
 
 
-def register(thing: Any, name: str | None = None, *, replace: bool = True) -> str:
+def register(thing: Any, name: str | None = None, *, replace: bool = False) -> str:
     """Give something of yours a name that commands, studies and tables know it by.
 
     Args:
@@ -75,7 +75,8 @@ def family_name(family: Any) -> str:
     """The name of a family in the registry; a generator is registered under its own."""
     if isinstance(family, str | Path):
         return str(family)
-    return register(family if isinstance(family, Family) else as_family(family, getattr(family, "__name__", "own")))
+    own = family if isinstance(family, Family) else as_family(family, getattr(family, "__name__", "own"))
+    return register(own, replace=True)
 
 
 def named(thing: Any) -> Strategy:

@@ -107,7 +107,9 @@ class Study:
             "arenas": self.arenas.count,
             "families": tuple(map(family_name, self.arenas.families)),
             "strategies": tuple(item if isinstance(item, str) else named(item).name for item in self.strategies),
-            "metrics": tuple(register(item) if isinstance(item, Metric) else item for item in self.metrics),
+            "metrics": tuple(
+                register(item, replace=True) if isinstance(item, Metric) else item for item in self.metrics
+            ),
             "population": self.arenas.population.model_dump(),
             "mission": self.mission.model_dump() | self._seen_and_moved(),
             "shard": self.shard,
@@ -123,7 +125,9 @@ class Study:
     def _seen_and_moved(self) -> dict[str, str]:
         """Names of the sensor and the executor, where they are not the mission's."""
         own = {"sensor": self.sensor, "executor": self.executor}
-        return {kind: item if isinstance(item, str) else register(item) for kind, item in own.items() if item}
+        return {
+            kind: item if isinstance(item, str) else register(item, replace=True) for kind, item in own.items() if item
+        }
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:

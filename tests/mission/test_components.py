@@ -116,9 +116,10 @@ def test_a_built_in_name_is_not_given_away():
             jb.register(thing, name)
     other = component(jb.Sensor)
     try:
-        assert jb.register(other, "one_more") == "one_more" and jb.register(jb.RayCast(), "one_more") == "one_more"
+        assert jb.register(other, "one_more") == "one_more"
         with pytest.raises(jb.InputError, match="is taken"):
-            jb.register(other, "one_more", replace=False)
+            jb.register(jb.RayCast(), "one_more")
+        assert jb.register(jb.RayCast(), "one_more", replace=True) == "one_more"
     finally:
         SENSORS.held.pop("one_more")
     assert set(SENSORS) >= {"raycast", "oracle"} and set(EXECUTORS) >= {"kinematic"} and "spl" in METRICS
