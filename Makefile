@@ -33,13 +33,13 @@ compare: install
 	$(BIN)/jaxbiped compare configs/studies/compare.toml
 
 quick: install
-	$(BIN)/python -m pytest -m "not slow" -n 2 $(QUICK)
+	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile $(QUICK)
 
 test: install
-	$(BIN)/python -m pytest -m "not slow" -n 2
+	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile
 
 test-all: install
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 	$(BIN)/python -m tests.planning.million
 
 lint: install
