@@ -69,7 +69,8 @@ def check_matplotlibrc(file: Path) -> None:
         try:
             file.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"cannot be read as text: {error}", file=file) from None
+            message = "cannot be read as text: it is not in UTF-8" if isinstance(error, UnicodeDecodeError) else "cannot be read"
+            raise InputError(f"{message}; matplotlib would read its settings from it", file=file) from None
 
 
 def check_flags(flags: str) -> None:

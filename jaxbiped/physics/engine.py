@@ -106,7 +106,8 @@ class Engine:
             sizes = {"naconmax": contacts * batch_size, "njmax": EDGES * contacts} if impl == "warp" else {}
             self.empty = mjx.make_data(model, device=self.device, impl=impl, **sizes)
         except (NotImplementedError, AssertionError, RuntimeError) as error:
-            raise InputError(f"MJX cannot step this model: {error}", field="model") from None
+            said = " ".join(str(error).split()) or "a kind of element that it does not know"
+            raise InputError(f"MJX cannot step this model: {said}", field="model") from None
         self.impl = impl
         self.static = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
         self.body_of_static = model.geom_bodyid[self.static]

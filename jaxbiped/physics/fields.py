@@ -10,6 +10,7 @@ from mujoco.batch import Batch, SimulationError
 
 from jaxbiped.errors import InputError
 from jaxbiped.physics import inputs
+from jaxbiped.physics.mjcf_errors import mjcf_problem
 
 
 class Fields:
@@ -35,7 +36,8 @@ class Fields:
         try:
             self.batch.set_const(ids.astype(np.int32))
         except SimulationError as error:
-            raise InputError(f"give no possible model in simulation {error.ids[0]}: {error}", field="fields") from None
+            said = mjcf_problem(error)
+            raise InputError(f"give no possible model in simulation {error.ids[0]}: {said}", field="fields") from None
 
     def only(self, values: Mapping[str, Float64[np.ndarray, "B ..."]]) -> None:
         """Make these, and no others, differ from the model's own."""

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 
 from jaxbiped.errors import InputError
+from jaxbiped.physics.mjcf_errors import mjcf_problem
 
 Watches = Mapping[str, Sequence[tuple[str, str]]]
 
@@ -43,7 +44,7 @@ def load(source: Any, *, free_joint: bool = False, watch: Watches | None = None)
         try:
             model = spec.compile()
         except ValueError as error:
-            raise InputError(f"is no valid model: {error}", file=file) from None
+            raise InputError(f"is no valid model: {mjcf_problem(error)}", file=file) from None
     if free_joint and mujoco.mjtJoint.mjJNT_FREE not in model.jnt_type:
         raise InputError("the model must have a free joint", file=file, field="joint")
     return model
@@ -57,7 +58,7 @@ def read(source: Any) -> tuple[mujoco.MjSpec, Path | None]:
         try:
             return mujoco.MjSpec.from_string(source), None
         except ValueError as error:
-            raise InputError(f"the MJCF does not parse: {error}", field="model") from None
+            raise InputError(f"the MJCF does not parse: {mjcf_problem(error)}", field="model") from None
     if not isinstance(source, str | Path):
         raise InputError("must be MJCF, its path, a mujoco.MjSpec or a mujoco.MjModel", field="model", value=source)
     file = Path(source)
@@ -66,7 +67,7 @@ def read(source: Any) -> tuple[mujoco.MjSpec, Path | None]:
     try:
         return mujoco.MjSpec.from_file(str(file)), file
     except ValueError as error:
-        raise InputError(f"the MJCF does not parse: {error}", file=file) from None
+        raise InputError(f"the MJCF does not parse: {mjcf_problem(error)}", file=file) from None
 
 
 def add_watches(spec: mujoco.MjSpec, watch: Watches) -> None:
