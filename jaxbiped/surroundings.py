@@ -69,8 +69,9 @@ def check_matplotlibrc(file: Path) -> None:
         try:
             file.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            message = "cannot be read as text: it is not in UTF-8" if isinstance(error, UnicodeDecodeError) else "cannot be read"
-            raise InputError(f"{message}; matplotlib would read its settings from it", file=file) from None
+            why = ": it is not in UTF-8" if isinstance(error, UnicodeDecodeError) else ""
+            message = f"cannot be read as text{why}; matplotlib would read its settings from it"
+            raise InputError(message, file=file) from None
 
 
 def check_flags(flags: str) -> None:
