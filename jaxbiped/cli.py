@@ -128,6 +128,11 @@ def dispatch(name: str, rest: list[str]) -> int:
         required = {name for name, field in options.model_fields.items() if field.is_required()}
         known = defaults(options, data | dict.fromkeys(required, "-"), path)
         extra["default"] = known.model_copy(update=dict.fromkeys(required, tyro.MISSING))
+    from jaxbiped.commands.short_help import is_asked, print_help
+
+    if is_asked(rest):
+        print_help(options, name, rest, extra.get("default"))
+        raise SystemExit(0)
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
@@ -278,7 +283,8 @@ def is_rule(row: str) -> bool:
 def usage() -> str:
     """What `jaxbiped --help` prints."""
     lines = "\n".join(f"  {name:<10} {summary}" for name, (_, _, summary, _) in COMMANDS.items())
-    return f"usage: jaxbiped COMMAND [options]\n\n{lines}\n\n`jaxbiped COMMAND --help` lists its options."
+    end = "`jaxbiped COMMAND --help` shows the options that most people need, --help-all shows all of them."
+    return f"usage: jaxbiped COMMAND [options]\n\n{lines}\n\n{end}"
 
 
 if __name__ == "__main__":

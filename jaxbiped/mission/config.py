@@ -101,25 +101,26 @@ class MissionConfig(Model):
     """One kind of mission. Every default is the paper's value, or named where it is chosen."""
 
     sensor: Literal["raycast", "oracle", "stereo"] = "raycast"
-    """`stereo`: pairs of pictures, rendered and matched on the host."""
+    """What the robot sees with: raycast (rays with a stereo camera's noise), oracle (the truth), or stereo (pictures,
+    rendered and matched). Those of `stereo` are computed on the host."""
     preset: str = "rendered"
-    """How well the camera measures, the default of each number of `stereo` and `landmarks`: ideal, rendered, real, or a
-    sensor file (.toml), as `jaxbiped fit-sensor` writes it, which says how many rays the camera has, too. What is given
-    beside it wins; the rays need only divide the camera's size as it then is."""
+    """How well the camera measures: ideal, rendered, real, or a sensor file (.toml). It is the default of each number
+    of `stereo` and `landmarks`. A file, as `jaxbiped fit-sensor` writes it, may say how many rays the camera has, too.
+    What is given beside it wins; the rays need only divide the camera's size as it then is."""
     executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
-    """`sampled`: moves as simulated bipeds were measured to (`library`). `native` and `mjx`: simulated bipeds, in
-    MuJoCo's own batch or in MJX."""
+    """How the robot moves: kinematic (exactly), sampled (as simulated bipeds did), or as a biped simulated in native
+    MuJoCo or in mjx. What simulated bipeds did is in `library`."""
     localisation: Literal["landmarks", "odometry", "visual", "icp", "both"] = "landmarks"
-    """How the robot knows where it stands: dead reckoning, corrected by landmarks, by nothing (`odometry`), by the
-    motion that two views tell (`visual`), by walls measured before (`icp`), or by the last two. The paper has the
-    first alone; without landmarks there are none in the arena. The sensor `oracle` knows the pose."""
+    """What corrects dead reckoning: landmarks, odometry (nothing), visual (the motion that two views tell), icp (walls
+    measured before), or both (the last two). The paper has the first alone; without landmarks there are none
+    in the arena. The sensor `oracle` knows the pose."""
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False
     """May an oblique move pass one blocked cell?"""
     planner: Literal["cell", "heading"] = "cell"
-    """`cell`: the least cost by Eq. 1 (the paper's). `heading`: the least time over cells and headings, turns counted;
-    of the costs, C4 alone still counts there."""
+    """What is planned: the cell path of least cost by Eq. 1 (the paper's), or the heading path, of the least time over
+    cells and headings, turns counted. Of the costs, C4 alone still counts for `heading`."""
     foot_placement: bool | None = None
     """Are the feet placed by measured edges? Else edges are crossed from cell to cell, as in the paper. By default for
     all executors but `kinematic`."""

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 import pydantic
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 
 
-class ReproduceArgs(Model):
+class ReproduceArgs(Options):
     """Repeat the paper's experiments and write one page: its Tables 1 to 4 with our figures beside the paper's, the
     reasons where they differ, pictures after its figures, and the population behind its example.
     """

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
 
 from jaxbiped.commands.options.engine import EngineArgs
+from jaxbiped.commands.options.strategies import strategy_notes
 from jaxbiped.study.sweep import SweepConfig
 
 
@@ -14,7 +16,13 @@ class SweepArgs(EngineArgs, SweepConfig):
     The sweep in TOML comes first, such as sweeps/costs.toml; options on the command line override it.
     """
 
+    BASIC: ClassVar[tuple[str, ...]] = (
+        *("seed", "arenas", "families", "strategies", "mission.sensor", "mission.preset", "mission.executor"),
+        *("resume", "out"),
+    )
+    NOTES: ClassVar[str] = strategy_notes()
+
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/sweep-<hash of the sweep>."""
     resume: bool = False
-    """Go on with the same sweep in the folder, where it was stopped; or begin it."""
+    """Go on with the sweep in the folder where it was stopped, or begin it."""
