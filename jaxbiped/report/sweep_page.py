@@ -48,7 +48,7 @@ def write_sweep_page(
     if chosen is None:
         allowed = f"must be a sweep point with rows, {result.points[0].index} to {result.points[-1].index}"
         raise InputError(allowed, file=folder, field="point", value=point)
-    frame = read(folder)[0].filter(pl.col("point") == point)
+    frame = read(folder).rows.filter(pl.col("point") == point)
     comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
     page = page_of(
         frame,

@@ -45,7 +45,7 @@ def test_again_is_the_same_and_the_rows_stay(tmp_path):
     second = write_report(folder, resamples=100)
     assert second.comparison == first.comparison
     assert {path: path.read_bytes() for path in second.files} == before
-    assert store.read(folder)[0].height == 300
+    assert store.read(folder).rows.height == 300
 
 
 def test_an_unfinished_study_says_so(tmp_path):
