@@ -180,6 +180,7 @@ class Recorder:
             outcome=code.label,
             true_z=np.array([m["z"] for m in moments]),
             squat=np.array([m["squat"] for m in moments]),
+            seen=np.array([m["seen"] for m in moments]),
             points=tuple(m["points"] for m in moments),
             voxels=np.stack([m["voxels"] for m in moments]),
             level_height=self.program.spec.level_height,
