@@ -16,7 +16,7 @@ from jaxbiped.report.plots import Plot, attribution_sheet, plots
 from jaxbiped.report.tables import (
     code_sheet,
     pair_sheet,
-    strategy_sheet,
+    strategy_sheets,
     stratum_sheet,
     success_sheet,
 )
@@ -107,7 +107,7 @@ def sections(frame: pl.DataFrame, comparison: Comparison) -> tuple[Section, ...]
     drawn = plots(frame, comparison)
     kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
     found = [
-        Section("Strategies", plots=tuple(drawn["strategies"]), grids=(to_grid(strategy_sheet(comparison)),)),
+        Section("Strategies", plots=tuple(drawn["strategies"]), grids=tuple(map(to_grid, strategy_sheets(comparison)))),
     ]
     if comparison.question:
         first, second = comparison.question

@@ -66,7 +66,7 @@ def test_it_says_what_was_asked_answered_and_done(read):
 
 
 def test_tables_are_complete(read):
-    assert len(read.tables) == 8
+    assert len(read.tables) == 9
     for table in read.tables:
         widths = {sum(span for span, _ in row) for row in table}
         assert len(table) > 1 and len(widths) == 1
