@@ -36,7 +36,7 @@ def write_sweep_page(
       report: of the sweep.
       point: at which strategies are compared in full; by default that with the config's own values, else the first.
       resamples: of the bootstraps at that point.
-      examples: arenas to be played again and drawn there, see `summary.write_report`.
+      examples: arenas to be played again and drawn there, see `folder_report.write_report`.
 
     Raises:
       InputError: a point that has no rows, or a file that cannot be written.

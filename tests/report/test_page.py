@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from jaxbiped.report.folder_report import write_report
 from jaxbiped.report.grid import parsed, to_grid, typeset
 from jaxbiped.report.plots import attributed, attribution_sheet
-from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import Sheet
 from jaxbiped.study import create
 from tests.report.html_reader import Reader

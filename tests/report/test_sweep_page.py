@@ -6,12 +6,13 @@ import pytest
 from jaxbiped import cli
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
+from jaxbiped.report import Report, SweepReport, write_report
 from jaxbiped.report.sweep import write_sweep_report
 from jaxbiped.report.sweep_page import write_sweep_page
 from jaxbiped.study import create
 from tests.report.html_reader import Reader
 from tests.study.synthetic import rows
-from tests.study.test_sides import other
+from tests.study.test_sides import other, stored
 
 C3, WIDTH = {"field": "costs.c3", "values": [5.0, 10.0, 20.0]}, {"field": "population.bump_width", "values": [0.2, 0.4]}
 
@@ -70,6 +71,16 @@ def test_one_strategy_has_rates_alone(tmp_path):
     folder = swept(tmp_path / "s", Config(axes=(C3,)), LINE, strategies=("full",))
     read = Reader(write_sweep_page(write_sweep_report(folder, resamples=20), resamples=20).read_text())
     assert "How does full fare against costs.c3?" in read.text
+
+
+def test_one_function_reports_on_comparisons_and_on_sweeps(tmp_path):
+    report = write_report(swept(tmp_path / "s", Config(axes=(C3,)), LINE), point=2, resamples=20)
+    assert isinstance(report, SweepReport)
+    assert [path.name for path in report.files] == ["report.html", "summary.md", "sweep.png"]
+    assert "At point 2" in (tmp_path / "s" / "report.html").read_text()
+    assert (tmp_path / "s" / "summary.md").read_text().startswith("# Sweep")
+    assert isinstance(write_report(stored(tmp_path / "r"), resamples=20), Report)
+    assert (tmp_path / "r" / "summary.md").read_text().startswith("# Strategies compared")
 
 
 def test_the_command_knows_a_sweep(tmp_path, capsys):
