@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import pydantic
 
 from jaxbiped.config import Model
-from jaxbiped.errors import InputError
 from jaxbiped.mapping.config import MapConfig
+from jaxbiped.mission.defaults import BELOW_POINTS as BELOW_POINTS
+from jaxbiped.mission.defaults import SIMULATED as SIMULATED
+from jaxbiped.mission.defaults import SWAYING as SWAYING
+from jaxbiped.mission.defaults import with_defaults
 from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.config import HEIGHT_TOLERANCE, DurationConfig, RobotConfig
 from jaxbiped.sensing.config import CameraConfig, LandmarkConfig, NoiseConfig, OdometryConfig, VisualConfig
@@ -24,10 +27,6 @@ if TYPE_CHECKING:
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
 HEADROOM = 12  # levels above that of the highest ground that a map holds: those within a standing robot of 38.5 cm
-SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinematic`: a walking biped sways, and its
-# stereo camera, as wide as the body, sweeps 12 cm to either side
-BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
-SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 VISUAL = ("visual", "both")  # localisations that measure the motion between two views
 ICP = ("icp", "both")  # those that measure the pose by walls that were measured before
 
@@ -140,33 +139,8 @@ class MissionConfig(Model):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _fill_in(cls, data):
-        """What is not given comes from the preset, field by field; the radius depends on who walks, the rule of
-        walls on what it sees with."""
-        if isinstance(data, dict) and data.get("executor", "kinematic") != "kinematic":
-            robot = data.get("robot", {})
-            data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
-        if isinstance(data, dict):
-            limits, robot = data.get("limits", {}), data.get("robot", {})
-            bears = limits.get("height_tolerance") if isinstance(limits, dict) else None
-            bears = getattr(limits, "height_tolerance", bears)  # a config, or something wrong
-            if isinstance(robot, dict) and bears is not None:
-                data = data | {"robot": {"height_tolerance": bears} | robot}
-        if isinstance(data, dict) and data.get("sensor") == "stereo":
-            rules = data.get("mapping", {})
-            data = data | {"mapping": {"below_points": BELOW_POINTS} | rules if isinstance(rules, dict) else rules}
-        try:
-            preset = sensor_preset(data.get("preset", "rendered"))
-        except (InputError, AttributeError, TypeError):
-            return data  # what is wrong is said of the field itself
-        filled = {}
-        for name in ("stereo", "landmarks"):
-            given = data.get(name, {})
-            filled[name] = getattr(preset, name).model_dump() | given if isinstance(given, dict) else given
-        camera = data.get("camera", {})
-        if preset.rays and isinstance(camera, dict):
-            filled["camera"] = preset.rays.model_dump() | camera
-        return data | filled
+    def _fill_in(cls, data: Any) -> Any:
+        return with_defaults(data) if isinstance(data, dict) else data
 
     @pydantic.field_validator("preset")
     @classmethod
