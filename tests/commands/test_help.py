@@ -40,7 +40,7 @@ def options_of(command: str) -> type[Options]:
 
 def flag(dotted: str) -> str:
     """A field as an option: those of the mission have no prefix."""
-    return "--" + dotted.removeprefix("mission.").replace("_", "-")
+    return "--" + dotted.removeprefix("mission.").removesuffix("_file").replace("_", "-")
 
 
 def leaves(model: type[Model], prefix: str = ""):

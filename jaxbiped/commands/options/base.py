@@ -1,10 +1,16 @@
-"""What the options of every command share: which of them most people need, and what is said below them."""
+"""What the options of every command share: which of them most people need, and files of a robot and a camera."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+import pydantic
+import tyro
 
 from jaxbiped.config import Model
+
+FILE_OPTIONS = {"robot_file": "robot", "camera_file": "camera"}  # field: the part of the config that its file is of
 
 
 class Options(Model):
@@ -15,3 +21,19 @@ class Options(Model):
     shown by `--help-all`."""
     NOTES: ClassVar[str] = ""
     """Lines below the options in both."""
+
+
+class RobotFileOptions(Options):
+    """Of commands that have a robot. What the file says is in the config, so that the option is no part of it."""
+
+    robot_file: Annotated[Path | None, tyro.conf.arg(name="robot", metavar="FILE")] = pydantic.Field(None, exclude=True)
+    """Robot, a TOML file as those in configs/robots. Options --robot.* win over it."""
+
+
+class CameraFileOptions(Options):
+    """Of commands that have a camera, as `RobotFileOptions`."""
+
+    camera_file: Annotated[Path | None, tyro.conf.arg(name="camera", metavar="FILE")] = pydantic.Field(
+        None, exclude=True
+    )
+    """Camera, a TOML file as those in configs/cameras. Options --camera.* win over it."""

@@ -18,7 +18,7 @@ class ClassifyArgs(ChartArgs):
     """Map a point cloud or, with --heightmap, an elevation map: class grid and levels, with pictures."""
 
     BASIC: ClassVar[tuple[str, ...]] = (
-        *("cloud", "heightmap", "cell", "range", "scale", "up", "floor", "pitch", "area", "out"),
+        *("cloud", "heightmap", "cell", "range", "scale", "up", "floor", "pitch", "area", "robot_file", "out"),
     )
 
     cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]

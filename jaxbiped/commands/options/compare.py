@@ -7,13 +7,14 @@ from typing import Annotated, ClassVar, Literal
 
 import pydantic
 
+from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
 from jaxbiped.commands.options.engine import EngineArgs
 from jaxbiped.commands.options.strategies import strategy_notes
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.names import MEASURES
 
 
-class CompareArgs(EngineArgs, StudyConfig):
+class CompareArgs(EngineArgs, RobotFileOptions, CameraFileOptions, StudyConfig):
     """Compare strategies on the same random arenas, with paired statistics.
 
     A study in TOML may come first; options override it. Scenes in its place, or a folder of them, are the arenas:
@@ -23,7 +24,7 @@ class CompareArgs(EngineArgs, StudyConfig):
 
     BASIC: ClassVar[tuple[str, ...]] = (
         *("seed", "arenas", "families", "strategies", "mission.sensor", "mission.preset", "mission.executor"),
-        *("resume", "out"),
+        *("robot_file", "camera_file", "resume", "out"),
     )
     NOTES: ClassVar[str] = strategy_notes()
 

@@ -8,18 +8,18 @@ from typing import Annotated, ClassVar
 import pydantic
 import tyro
 
-from jaxbiped.commands.options.base import Options
+from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
 from jaxbiped.commands.options.strategies import strategy_notes
 from jaxbiped.mission.config import MissionConfig
 from jaxbiped.study.config import StrategyName
 
 
-class RunArgs(Options):
+class RunArgs(RobotFileOptions, CameraFileOptions):
     """Run one mission in a scene: print what the robot plays, and write pictures of its map."""
 
     BASIC: ClassVar[tuple[str, ...]] = (
         *("scene", "strategy", "seed", "mission.sensor", "mission.preset", "mission.executor"),
-        *("mission.planner", "out"),
+        *("mission.planner", "robot_file", "camera_file", "out"),
     )
     NOTES: ClassVar[str] = strategy_notes()
 

@@ -17,7 +17,7 @@ class StereoArgs(ChartArgs):
     """Map what a stereo pair shows: points, 3D grid and class grid, with pictures."""
 
     BASIC: ClassVar[tuple[str, ...]] = (
-        *("left", "right", "camera", "max_range", "num_disparities", "pitch", "area", "out"),
+        *("left", "right", "camera", "max_range", "num_disparities", "pitch", "area", "robot_file", "out"),
     )
 
     left: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LEFT")]

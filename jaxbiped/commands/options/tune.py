@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar, Literal
 
-from jaxbiped.commands.options.base import Options
+from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
 from jaxbiped.commands.options.strategies import strategy_notes
 from jaxbiped.study.names import STRATEGIES
 from jaxbiped.study.tuning_config import TuneConfig
 
 
-class TuneArgs(Options, TuneConfig):
+class TuneArgs(RobotFileOptions, CameraFileOptions, TuneConfig):
     """Tune the costs C1 to C4 on random arenas, and judge them on others.
 
     The planner takes the same paths when all costs double, so that C0 stays as it is. A TOML file may come first and
@@ -20,7 +20,8 @@ class TuneArgs(Options, TuneConfig):
 
     BASIC: ClassVar[tuple[str, ...]] = (
         *("seed", "arenas", "test_arenas", "families", "strategy", "from_durations"),
-        *("mission.sensor", "mission.preset", "mission.executor", "out"),
+        *("mission.sensor", "mission.preset", "mission.executor"),
+        *("robot_file", "camera_file", "out"),
     )
     NOTES: ClassVar[str] = strategy_notes(tuple(name for name in STRATEGIES if name != "blind_stop"), own=False)
 
