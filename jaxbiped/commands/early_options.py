@@ -38,8 +38,10 @@ def with_early(
     whole = "mission" in options.model_fields
     given = data.get("mission", {}) if whole else data
     found: dict[str, Any] = {}
+    parts = options.model_fields["mission"].annotation.model_fields if whole else options.model_fields
     for part, value in files(rest, options):
-        found[part] = {FILE: value}
+        if part in parts:  # else the command opens it
+            found[part] = {FILE: value}
     if whole:
         for option, value in deciding(rest, options.model_fields["mission"].annotation):
             part, _, name = option.rpartition(".")

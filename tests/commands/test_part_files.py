@@ -5,6 +5,7 @@ import importlib
 import pytest
 
 from jaxbiped import cli
+from jaxbiped.commands import reproduce
 from jaxbiped.config import config_hash, load
 from jaxbiped.errors import InputError
 from jaxbiped.mission.config import MissionConfig
@@ -101,6 +102,25 @@ def test_what_is_wrong_with_a_file_is_said_in_a_line(here, parsed, capsys, words
     (here / "odd.toml").write_text("wheels = 4\n")
     (here / "chain.toml").write_text('file = "odd.toml"\n')
     assert refused(capsys, "run", SCENE, *words).startswith(f"jaxbiped: {said}")
+
+
+def test_reproduce_takes_both_for_the_missions_of_its_scenes(here, parsed, monkeypatch, capsys):
+    seen = []
+
+    def gather(args, arenas, config, console):
+        seen.append(config)
+        raise InputError("enough")
+
+    monkeypatch.setattr(reproduce, "gather", gather)
+    monkeypatch.setattr(reproduce, "refuse_existing", seen.append)
+    for words in ([], ["--robot", "tall.toml", "--camera", "wide.toml", "--preset", "real"]):
+        refused(capsys, "reproduce", "--executor", "kinematic", *words)
+    folder, plain, other_folder, own = seen
+    assert plain == MissionConfig(sensor="stereo")
+    assert own == MissionConfig(sensor="stereo", robot="tall.toml", camera="wide.toml", preset="real")
+    assert other_folder.name.startswith(folder.name) and other_folder != folder
+    assert "robot: nowhere.toml: no such file" in refused(capsys, "reproduce", "--robot", "nowhere.toml")
+    assert "preset: must be one of ideal" in refused(capsys, "reproduce", "--preset", "best")
 
 
 def test_in_toml_the_file_is_named_too(here, parsed, capsys):
