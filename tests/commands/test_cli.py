@@ -146,13 +146,6 @@ def test_options_that_decide_defaults_do_so_in_both_spellings(here, mission_of, 
         assert getattr(getattr(mission_of("run", SCENE, *words), part), name) == expected, words
 
 
-def test_a_limit_decides_the_robots_tolerance_on_the_command_line_too(here, mission_of):
-    for words in (["--limits.height-tolerance", "0.02"], ["--limits.height_tolerance=.02"]):
-        assert mission_of("run", SCENE, *words) == MissionConfig(limits={"height_tolerance": 0.02})
-    mission = mission_of("run", SCENE, "--limits.height-tolerance", "0.02", "--robot.height-tolerance", "0.01")
-    assert (mission.limits.height_tolerance, mission.robot.height_tolerance) == (0.02, 0.01)
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

@@ -78,6 +78,13 @@ def test_a_file_counts_as_given_and_its_own_radius_stays(parsed):
     assert parsed("run", "--executor", "sampled", "--robot", "tall.toml").mission.robot.radius == 0.09
 
 
+def test_a_limit_decides_the_robots_tolerance_on_the_command_line_as_in_toml(parsed):
+    for words in (["--limits.height-tolerance", "0.02"], ["--limits.height_tolerance=.02"]):
+        assert parsed("run", *words).mission == MissionConfig(limits={"height_tolerance": 0.02})
+    mission = parsed("run", "--limits.height-tolerance", "0.02", "--robot.height-tolerance", "0.01").mission
+    assert (mission.limits.height_tolerance, mission.robot.height_tolerance) == (0.02, 0.01)
+
+
 def test_a_file_is_no_part_of_the_config(parsed):
     args = parsed("compare")
     assert "robot_file" not in args.model_dump() and "camera_file" not in args.model_dump()
