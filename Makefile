@@ -33,18 +33,19 @@ compare: install
 	$(BIN)/jaxbiped compare configs/studies/compare.toml
 
 quick: install
-	$(BIN)/python -m pytest -m "not slow" -n 2 $(QUICK)
+	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile $(QUICK)
 
 test: install
-	$(BIN)/python -m pytest -m "not slow" -n 2
+	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile
 
 test-all: install
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 	$(BIN)/python -m tests.planning.million
 
 lint: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy
 
 bench: install
 	$(BIN)/python sweeps/bench_startup.py

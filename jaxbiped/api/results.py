@@ -18,7 +18,8 @@ from jaxbiped.mission.strategies import Strategy
 from jaxbiped.study import store
 from jaxbiped.study.comparison import Comparison, compare, default_pairs
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.schema import ordered, validate
+from jaxbiped.study.names import MEASURES
+from jaxbiped.study.schema import metric_columns, ordered, validate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,9 +29,6 @@ class Kept(Model):
     """A config as it was stored: nothing in it is looked up, so that nothing is imported."""
 
     model_config = pydantic.ConfigDict(extra="allow", frozen=True)
-
-
-METRICS = ("success", "distance", "time")
 
 
 @dataclass(frozen=True)
@@ -152,13 +150,15 @@ class Results:
         """Each strategy's own metric with intervals, over the axis of a sweep or side by side.
 
         Args:
-          metric: success, distance or time; distance and time are means over a strategy's own reached missions.
+          metric: success, distance, time, or the column of another metric; distance and time are means over a
+            strategy's own reached missions.
 
         Raises:
           InputError: another metric; a sweep of several fields.
         """
-        if metric not in METRICS:
-            raise InputError(f"must be one of {', '.join(METRICS)}", field="metric", value=metric)
+        known = (*MEASURES, *metric_columns(self.rows))
+        if metric not in known:
+            raise InputError(f"must be one of {', '.join(known)}", field="metric", value=metric)
         if len(self.axes) > 1:
             raise InputError(
                 "draws one field; filter `rows` and `points` for the others", field="plot", value=self.axes

@@ -10,15 +10,16 @@ from pathlib import Path
 import jax
 import polars as pl
 
+from jaxbiped.api.register import named
 from jaxbiped.api.results import Results
-from jaxbiped.api.study import Study, named
+from jaxbiped.api.study import Study
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.scene import load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, write_whole
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission, Played
-from jaxbiped.mission.strategies import STRATEGIES, Strategy, find_strategy
+from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study import store
@@ -172,30 +173,3 @@ def play(
     with seeing(config) as eyes:
         played = play_one(arena, config, chosen, from_key(jax.random.key(seed)), on_decision, eyes)
     return PlayedMission(name, chosen.name, played)
-
-
-def register(thing: Strategy | Planner | Callable, name: str | None = None, *, replace: bool = False) -> str:
-    """Give a strategy, a planner or a planning function a name that commands, studies and tables know it by.
-
-    Args:
-      name: by default its own.
-      replace: whether it may take the place of another one that is not built in.
-
-    Returns:
-      The name.
-
-    Raises:
-      InputError: a name that is taken, or cannot be one.
-    """
-    strategy = named(thing) if name is None else as_named(thing, name)
-    from jaxbiped.study.schema import STRATEGIES as BUILT_IN
-
-    STRATEGIES.add(strategy.name, strategy, replace=replace and strategy.name not in BUILT_IN)
-    return strategy.name
-
-
-def as_named(thing: Strategy | Planner | Callable, name: str) -> Strategy:
-    """The same under another name."""
-    from dataclasses import replace
-
-    return replace(named(thing), name=name)

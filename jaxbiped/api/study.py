@@ -9,16 +9,20 @@ from typing import Any
 
 import pydantic
 
+from jaxbiped.api.register import family_name, named, register
 from jaxbiped.arenas.population import PopulationConfig
-from jaxbiped.arenas.source import Family, as_family
+from jaxbiped.arenas.source import Family
 from jaxbiped.config import input_error
-from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
 from jaxbiped.errors import InputError
+from jaxbiped.mission.execution import Executor
+from jaxbiped.mission.metric import Metric
+from jaxbiped.mission.sensors import Sensor
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.strategies import STRATEGIES, Strategy, as_strategy
+from jaxbiped.mission.strategies import STRATEGIES, Strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.names import METRICS
 from jaxbiped.study.schema import FAMILIES
 from jaxbiped.study.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.sweep import SweepConfig
@@ -67,6 +71,8 @@ class Study:
         of NumPy arrays (see `HostPlanner`, under their own name).
       mission: robot, sensor, executor, costs and so on, the same for all strategies.
       seed: of the arenas and of all noise.
+      metrics: columns beside those that all rows have: names, or metrics of your own, under the name of their class.
+      sensor, executor: in place of the mission's: names, or objects of your own, under the name of their class.
 
     Raises:
       InputError: a name that is not known, two strategies of one name, a number out of its range.
@@ -76,6 +82,9 @@ class Study:
     strategies: Sequence[str | Strategy | Planner | Any] = BUILT_IN
     mission: MissionConfig = field(default_factory=MissionConfig)
     seed: int = 0
+    metrics: Sequence[str | Metric] = METRICS
+    sensor: str | Sensor | None = None
+    executor: str | Executor | None = None
     shard: int = 1024  # arenas that are computed, and stored, together
     own: tuple[Strategy, ...] = field(init=False, repr=False)
 
@@ -96,10 +105,13 @@ class Study:
         data = {
             "seed": self.seed,
             "arenas": self.arenas.count,
-            "families": tuple(registered(item) for item in self.arenas.families),
+            "families": tuple(map(family_name, self.arenas.families)),
             "strategies": tuple(item if isinstance(item, str) else named(item).name for item in self.strategies),
+            "metrics": tuple(
+                register(item, replace=True) if isinstance(item, Metric) else item for item in self.metrics
+            ),
             "population": self.arenas.population.model_dump(),
-            "mission": self.mission.model_dump(),
+            "mission": self.mission.model_dump() | self._seen_and_moved(),
             "shard": self.shard,
         }
         if axes is not None:
@@ -110,6 +122,13 @@ class Study:
             raise input_error(error) from None
         return fingerprinted(config)
 
+    def _seen_and_moved(self) -> dict[str, str]:
+        """Names of the sensor and the executor, where they are not the mission's."""
+        own = {"sensor": self.sensor, "executor": self.executor}
+        return {
+            kind: item if isinstance(item, str) else register(item, replace=True) for kind, item in own.items() if item
+        }
+
     @classmethod
     def from_toml(cls, path: str | Path) -> Study:
         """The study of a TOML file, as `jaxbiped compare FILE` reads it."""
@@ -117,22 +136,4 @@ class Study:
 
         config = load(StudyConfig, path)
         arenas = RandomArenas(config.families, config.arenas, config.population)
-        return cls(arenas, config.strategies, config.mission, config.seed, config.shard)
-
-
-def registered(family: Any) -> str:
-    """The name of a family in the registry."""
-    if isinstance(family, str | Path):
-        return str(family)
-    made = family if isinstance(family, Family) else as_family(family, getattr(family, "__name__", str(family)))
-    FAMILIES_OWN.add(made.name, made, replace=True)
-    return made.name
-
-
-def named(thing: Any) -> Strategy:
-    """A strategy of something that stands for one, under its own name."""
-    if isinstance(thing, Strategy):
-        return thing
-    own = getattr(thing, "function", None) or thing
-    name = getattr(own, "__name__", None) or type(own).__name__
-    return as_strategy(thing, name)
+        return cls(arenas, config.strategies, config.mission, config.seed, config.metrics, config.shard)

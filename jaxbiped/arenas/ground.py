@@ -72,5 +72,10 @@ def refuse_terrain(arena: Arena, who: str) -> None:
       InputError: the arena has terrain.
     """
     if arena.terrain is not None:
-        known = ", ".join(f"{kind}s {' and '.join(names)}" for kind, names in WITH_TERRAIN.items())
-        raise InputError(f"does not know terrain, which this arena has; these do: {known}", field=who)
+        raise no_terrain_for(who)
+
+
+def no_terrain_for(who: str) -> InputError:
+    """What to say of something that does not know terrain."""
+    known = ", ".join(f"{kind}s {' and '.join(names)}" for kind, names in WITH_TERRAIN.items())
+    return InputError(f"does not know terrain, which this arena has; these do: {known}", field=who)

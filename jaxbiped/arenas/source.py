@@ -23,6 +23,7 @@ from jaxbiped.core.code_hash import component_hash
 from jaxbiped.core.registry import FAMILIES
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes
+from jaxbiped.geometry.height_field import HeightField
 
 Generator = Callable[[PRNGKeyArray], Arena]
 NAME = re.compile(r"[A-Za-z0-9][\w .+-]{0,39}")  # shown in tables, figures and pages
@@ -110,21 +111,26 @@ def check_name(name: object, file: Path | None = None) -> None:
         raise InputError("is the name of a family that is built in", file=file, field="name of a family", value=name)
 
 
+def scene_name(path: Path) -> str:
+    """The family's name of a scene file: the file's, which is told from that of a family that is built in."""
+    return f"scene {path.stem}" if path.stem in KNOWN else path.stem
+
+
 def scene_family(path: str | Path) -> SceneFamily:
-    """A scene file as a family that has the file's name.
+    """A scene file as a family that has the file's name (`scene_name`).
 
     Raises:
       InputError: what is wrong with the file.
     """
-    check_name(Path(path).stem, Path(path))
-    refuse_terrain(load_scene(path)[1], "a study")
+    check_name(scene_name(Path(path)), Path(path))
+    load_scene(path)
     text = hashlib.sha256(Path(path).read_bytes()).hexdigest()[:12]
     return _scene_family(Path(path), text)
 
 
 @cache
 def _scene_family(path: Path, text: str) -> SceneFamily:
-    return SceneFamily(path.stem, path, text, jax.device_get(load_scene(path)[1]))
+    return SceneFamily(scene_name(path), path, text, jax.device_get(load_scene(path)[1]))
 
 
 def find_family(name: str) -> str | OwnFamily:
@@ -154,28 +160,17 @@ def name_of(family: str | OwnFamily) -> str:
     return family if isinstance(family, str) else family.name
 
 
-def area_of(families: Sequence[str | OwnFamily]) -> tuple[float, float]:
-    """[m] The size that all arenas of a study have.
-
-    Raises:
-      InputError: families of different sizes.
-    """
-    sizes = {name_of(item): _size(item) for item in families}
-    first, size = next(iter(sizes.items()))
-    for name, other in sizes.items():
-        if other != size:
-            (x, y), (u, v) = size, other
-            message = f"{name} is {u:g} x {v:g} m, {first} {x:g} x {y:g} m; one study has arenas of one size"
-            raise InputError(message, field="families")
-    return size
-
-
-def _size(family: str | OwnFamily) -> tuple[float, float]:
+def size_of(family: str | OwnFamily) -> tuple[float, float]:
+    """[m] The size that all arenas of a family have."""
     if isinstance(family, str):
         return SIZE_X, SIZE_Y
-    size = np.asarray(_one(family).size_xy)
-    x, y = (round(float(side), 6) for side in size)
+    x, y = (round(float(side), 6) for side in np.asarray(_one(family).size_xy))
     return x, y
+
+
+def terrain_of(family: str | OwnFamily) -> HeightField | None:
+    """The terrain of a scene; no other family has any."""
+    return family.scene.terrain if isinstance(family, SceneFamily) else None
 
 
 @cache
@@ -189,6 +184,7 @@ def draw_arena(
     index: Int[Array, ""],
     families: tuple[str | OwnFamily, ...],
     population: Population | None = None,
+    turn: Int[Array, ""] | None = None,
 ) -> Arena:
     """Arena `index` of a study whose families take turns.
 
@@ -197,11 +193,12 @@ def draw_arena(
     Args:
       families: static.
       population: what is fixed of families that are built in.
+      turn: which of the families it is; by default `index` modulo their number.
     """
     own = [item for item in families if not isinstance(item, str)]
     if not own:
-        return sample(key, index, families, population)
-    turn = index % len(families)
+        return sample(key, index, families, population, turn)
+    turn = index % len(families) if turn is None else turn
     built_in = tuple(item for item in families if isinstance(item, str))
     each = [item.arena(jax.random.fold_in(jax.random.fold_in(key, index), OWN)) for item in own]
     places = [k for k, item in enumerate(families) if not isinstance(item, str)]

@@ -21,7 +21,7 @@ from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.report.animation import save_gif
 from jaxbiped.report.pictures import save_mission
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.runner import check_mission, play_one, program_for, seeing
+from jaxbiped.study.runner import check_mission, play_one, program_of, seeing
 
 NOT_REACHED = 1  # exit status
 
@@ -40,7 +40,7 @@ def main(args: RunArgs) -> int:
     out = args.out or Path("results") / f"run-{args.scene.stem}-{args.strategy.replace(':', '.')}-{identity}"
     refuse_existing(out)
     name, arena = load_scene(args.scene)
-    static = program_for(args.mission, arena)
+    static = program_of(args.mission, arena)
     for text in scene_warnings(arena, args.mission.robot, static.spec.level_height):
         print(f"jaxbiped: warning: {args.scene}: {text}", file=sys.stderr)
     strategy = find_strategy(args.strategy)

@@ -31,12 +31,15 @@ FUNCTIONS: dict[int, Function] = {}
 NUMBERS = itertools.count()
 
 
-def host_call(function: Function, results: Sequence[jax.ShapeDtypeStruct], *arguments: jax.Array) -> list[jax.Array]:
+def host_call(
+    function: Function, results: Sequence[jax.ShapeDtypeStruct], *arguments: jax.Array, vmap_method: str | None = None
+) -> list[jax.Array]:
     """`function(*arguments)`, called on the host with NumPy arrays that it must not keep, once for the whole batch.
 
     Args:
       function: returns arrays as `results` say; must not raise.
       results, arguments: bool, int8, int32, uint32 or float32.
+      vmap_method: as of `jax.pure_callback`; by default `jax.vmap` of it is an error.
     """
     number = next((n for n, known in FUNCTIONS.items() if known is function), None)
     if number is None:
@@ -45,10 +48,11 @@ def host_call(function: Function, results: Sequence[jax.ShapeDtypeStruct], *argu
 
     def on_cpu(*arguments):
         register()
-        return jax.ffi.ffi_call(NAME, list(results), has_side_effect=True)(jnp.int32(number), *arguments)
+        call = jax.ffi.ffi_call(NAME, list(results), has_side_effect=True, vmap_method=vmap_method)
+        return call(jnp.int32(number), *arguments)
 
     def elsewhere(*arguments):
-        return list(jax.pure_callback(function, list(results), *arguments))
+        return list(jax.pure_callback(function, list(results), *arguments, vmap_method=vmap_method))
 
     return jax.lax.platform_dependent(*arguments, cpu=on_cpu, default=elsewhere)
 
@@ -93,7 +97,7 @@ def handler(address):
         outs = [array(buffer) for buffer in words(frame[FRAME_RESULTS], frame[FRAME_RESULT_COUNT])]
         for out in outs:
             out[...] = 0  # what is left where the function fails
-        for out, made in zip(outs, FUNCTIONS[int(number)](*arguments), strict=True):
+        for out, made in zip(outs, FUNCTIONS[int(number.flat[0])](*arguments), strict=True):
             out[...] = made
     except BaseException:  # there is nobody to catch it
         traceback.print_exc()

@@ -95,6 +95,9 @@ def is_equal(one: object, other: object) -> bool:
 
 STRATEGIES: Registry = Registry("strategy", "jaxbiped.planners")  # filled by `mission.strategies`
 FAMILIES: Registry = Registry("family", "jaxbiped.arenas")  # of arenas that are not built in
+SENSORS: Registry = Registry("sensor", "jaxbiped.sensors")  # filled by `mission.sensors`
+EXECUTORS: Registry = Registry("executor", "jaxbiped.executors")  # filled by `mission.executors`
+METRICS: Registry = Registry("metric", "jaxbiped.metrics")  # filled by `mission.metrics`
 
 
 def load(place: str, kind: str) -> object:

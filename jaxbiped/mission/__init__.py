@@ -7,7 +7,8 @@ lazy_package(
     {
         "config": "MissionConfig",
         "decision": "decide",
-        "executors": "EXECUTORS Execution Executor kinematic",
+        "executors": "Kinematic Sampled kinematic",
+        "execution": "Execution Executor",
         "log": "MissionLog",
         "oracle": "OraclePlan oracle_plan",
         "outcome": "Code",

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import pydantic
 
 from jaxbiped.config import Model
+from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
+from jaxbiped.core.registry import PLACE, Registry
+from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mission.defaults import BELOW_POINTS as BELOW_POINTS
 from jaxbiped.mission.defaults import SIMULATED as SIMULATED
@@ -27,9 +30,32 @@ if TYPE_CHECKING:
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
 HEADROOM = 12  # levels above that of the highest ground that a map holds: those within a standing robot of 38.5 cm
+RENDERED = ("stereo",)  # sensors that measure on the host
+SENSORS, EXECUTORS = ("raycast", "oracle", *RENDERED), ("kinematic", "sampled", *SIMULATED)  # that are built in
 VISUAL = ("visual", "both")  # localisations that measure the motion between two views
 ICP = ("icp", "both")  # those that measure the pose by walls that were measured before
 
+
+def known_sensor(name: str) -> str:
+    """A name that is registered, or `package.module:name`, of which nothing is imported here."""
+    return known_component(name, SENSORS, SENSORS_OWN)
+
+
+def known_executor(name: str) -> str:
+    """The same of an executor."""
+    return known_component(name, EXECUTORS, EXECUTORS_OWN)
+
+
+def known_component(name: str, built_in: tuple[str, ...], registered: Registry) -> str:
+    """The name, where it may be that of a component."""
+    if not (name in built_in or registered.knows(name) or PLACE.fullmatch(name)):
+        known = ", ".join(dict.fromkeys([*built_in, *registered]))
+        raise ValueError(f"must be one of {known}, or package.module:name of your own {registered.kind}")
+    return name
+
+
+SensorName = Annotated[str, pydantic.AfterValidator(known_sensor)]
+ExecutorName = Annotated[str, pydantic.AfterValidator(known_executor)]
 
 # Bounded so that sums of costs along a path keep their differences in single precision.
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
@@ -99,16 +125,16 @@ class WalkConfig(Model):
 class MissionConfig(Model):
     """One kind of mission. Every default is the paper's value, or named where it is chosen."""
 
-    sensor: Literal["raycast", "oracle", "stereo"] = "raycast"
-    """What the robot sees with: raycast (rays with a stereo camera's noise), oracle (the truth), or stereo (pictures,
-    rendered and matched). Those of `stereo` are computed on the host."""
+    sensor: SensorName = "raycast"
+    """What the robot sees with: raycast (noisy rays), oracle (the truth), stereo, or package.module:name. Rays have the
+    noise of a stereo camera; the pictures of `stereo` are rendered and matched on the host."""
     preset: str = "rendered"
     """How well the camera measures: ideal, rendered, real, or a sensor file (.toml). It is the default of each number
     of `stereo` and `landmarks`. A file, as `jaxbiped fit-sensor` writes it, may say how many rays the camera has, too.
     What is given beside it wins; the rays need only divide the camera's size as it then is."""
-    executor: Literal["kinematic", "sampled", "native", "mjx"] = "kinematic"
-    """How the robot moves: kinematic (exactly), sampled (as simulated bipeds did), or as a biped simulated in native
-    MuJoCo or in mjx. What simulated bipeds did is in `library`."""
+    executor: ExecutorName = "kinematic"
+    """How it moves: kinematic (exactly), sampled (as simulated bipeds did), native or mjx (simulated), or
+    package.module:name. What simulated bipeds did is in `library`; `native` is MuJoCo's own batch."""
     localisation: Literal["landmarks", "odometry", "visual", "icp", "both"] = "landmarks"
     """What corrects dead reckoning: landmarks, odometry (nothing), visual (the motion that two views tell), icp (walls
     measured before), or both (the last two). The paper has the first alone; without landmarks there are none

@@ -14,23 +14,22 @@ from jaxbiped.arenas.movers import at_time, only
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.mission.decision import Thought, climbed, decide
 from jaxbiped.mission.encounter import met
-from jaxbiped.mission.executors import EXECUTORS, Execution
+from jaxbiped.mission.execution import Execution, execution_of
 from jaxbiped.mission.footing import walked
 from jaxbiped.mission.localising import carried_on, unmarked
+from jaxbiped.mission.metric import Step, updated
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.sensors import Oracle, RayCast, Standpoint, view_of
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.motion.primitives import Command
-from jaxbiped.sensing import landmarks, oracle, raycast
+from jaxbiped.sensing import landmarks
 from jaxbiped.sensing.hashing import fold
 from jaxbiped.sensing.localisation import predict
 from jaxbiped.sensing.view import Sightings, View
 
 SENSE = 1  # channel of a mission's seed
-ORACLE_SPACING = (
-    0.02  # [m] of the columns of the oracle's points, or a cell's pitch if that is less; thinner walls slip through
-)
-ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid by itself
+TRUSTED = (RayCast, Oracle, type(None))  # sensors whose numbers are finite
 
 
 def cycle(
@@ -60,12 +59,17 @@ def cycle(
 
 def carry_out(arena: Arena, world: World, command: Command, settings: Settings, program: Program) -> Execution:
     """What comes of the command of each robot, among boxes that stand and boxes that move."""
-    play = jax.vmap(EXECUTORS[program.executor])
+    play = jax.vmap(played)
     if arena.movers is None:
         return play(arena, world, command, settings)
     executed = play(jax.vmap(partial(only, moving=False))(arena), world, command, settings)
     run_into = jax.vmap(met)(arena, world, command, executed, settings)
     return replace(executed, collided=executed.collided | run_into, fell=executed.fell & ~run_into)
+
+
+def played(arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+    """What comes of the command of one robot."""
+    return execution_of(settings.executor, arena, world, command, settings)
 
 
 def think(
@@ -89,10 +93,15 @@ def think(
         seen = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, now, settings, program, carriage)
     # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
     view, sightings = jax.lax.optimization_barrier(seen)
-    if program.sensor == "oracle":
+    if program.knows_pose:
         mind = replace(mind, belief=replace(mind.belief, pose=world.pose))
     active = world.code == Code.RUNNING
-    return view, *decide(mind, view, sightings, arena, settings, program, active)
+    if type(settings.sensor) in TRUSTED:
+        return view, *decide(mind, view, sightings, arena, settings, program, active)
+    broken = jnp.any(jnp.isnan(view.weight), axis=-1)
+    view = replace(view, weight=jnp.where(broken[:, None], 0.0, view.weight))
+    mind, command, verdict, thought = decide(mind, view, sightings, arena, settings, program, active)
+    return view, mind, command, jnp.where(broken & active, Code.INVALID, verdict), thought
 
 
 def sense(
@@ -102,16 +111,10 @@ def sense(
     pose = world.pose if carriage is None else carriage.pose
     attitude = None if carriage is None else (carriage.roll, carriage.pitch)
     seed = fold(world.seed, SENSE, world.decisions)
-    if program.sensor == "oracle":
-        area = (program.spec.size_x, program.spec.size_y)
-        spacing, levels = min(ORACLE_SPACING, program.spec.pitch), program.spec.levels + program.spec.lowest
-        view = oracle.measure(arena, world.pose, area, spacing=spacing, levels=levels, weight=ORACLE_WEIGHT)
-    elif program.sensor == "raycast":
-        view = raycast.measure(
-            arena, pose, settings.camera, settings.stereo, program.image, seed, mind.look, world.squat, attitude
-        )
-    else:
+    if settings.sensor is None:
         raise ValueError(f"the sensor {program.sensor} measures on the host: its missions are given what they see")
+    at = Standpoint(world.pose if program.knows_pose else pose, mind.look, world.squat, attitude, seed)
+    view = view_of(settings.sensor, arena, at, settings, program)
     if program.localisation != "landmarks":
         return view, unmarked(view, world, mind, arena, settings, program, seed)
     return view, landmarks.sight(
@@ -148,7 +151,7 @@ def conclude(
     astray = jnp.hypot(belief.pose.x - pose.x, belief.pose.y - pose.y)
     sane = jnp.isfinite(away + time + pose.yaw + belief.pose.x + belief.pose.y + belief.pose.yaw)
     code = jnp.where(sane, code, Code.INVALID).astype(jnp.int32)
-    world = World(
+    after = World(
         pose=pose,
         squat=jnp.where(stays, world.squat, command.squat),
         distance=world.distance + jnp.where(stays, 0.0, executed.distance),
@@ -162,5 +165,8 @@ def conclude(
         before=None if world.before is None else world.pose,
         planned=mind.planned,
     )
+    if settings.metrics:
+        step = Step(arena, world, after, command, ~stays, settings)
+        after = replace(after, metrics=updated(settings.metrics, world.metrics, step))
     mind = carried_on(walked(mind, command, executed.moved, executed.variances), executed.moved, executed.variances)
-    return world, replace(mind, belief=belief, since=settings.durations.measure + acted)
+    return after, replace(mind, belief=belief, since=settings.durations.measure + acted)

@@ -147,7 +147,7 @@ def read_map(
     """
     spec, pose = program.spec, mind.belief.pose
     ij = cell_of(pose.x, pose.y, spec)
-    tilted = program.sensor != "oracle"  # whose points have no attitude error to take out, and which knows its pose
+    tilted = not program.knows_pose
     if tilted:
         pose = replace(pose, z=mapping.ground_height(mind.grid_map, ij, pose.z, spec))
         mind = replace(mind, belief=replace(mind.belief, pose=pose))

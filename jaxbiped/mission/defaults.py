@@ -20,9 +20,10 @@ SWAYING = 0.125  # [m] a walking biped sways, and its stereo camera, as wide as 
 BELOW_POINTS = 50.0  # for rendered stereo; others keep the map that was published
 SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 
+OTHER = ""  # stands for each value that a table does not name
 # Choice: value: what it makes the default of other fields.
 BY_CHOICE: dict[str, dict[str, dict[str, float]]] = {
-    "executor": {name: {"robot.radius": SWAYING} for name in ("sampled", *SIMULATED)},
+    "executor": {"kinematic": {}, OTHER: {"robot.radius": SWAYING}},
     "sensor": {"stereo": {"mapping.below_points": BELOW_POINTS}},
 }
 FOLLOWING = {"robot.height_tolerance": "limits.height_tolerance"}  # field: whose value is its default, where given
@@ -40,9 +41,9 @@ def with_defaults(data: dict[str, Any]) -> dict[str, Any]:
         if part in data:
             data = data | {part: opened(model, data[part])}
     for choice, table in BY_CHOICE.items():
-        value = data.get(choice)
-        for field, default in table.get(value if isinstance(value, str) else "", {}).items():
-            data = filled(data, field, default)
+        if isinstance(value := data.get(choice), str):
+            for field, default in table.get(value, table.get(OTHER, {})).items():
+                data = filled(data, field, default)
     for field, source in FOLLOWING.items():
         part, _, name = source.partition(".")
         fields = given_fields(data.get(part, {})) or {}

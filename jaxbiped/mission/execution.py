@@ -1,18 +1,20 @@
-"""What an executor is: it plays a command of one arena in the true world."""
+"""What an executor is, that plays a command of one arena in the true world inside the compiled loop."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, ClassVar
 
 import jax
+import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.component import check_component
+from jaxbiped.core.registry import EXECUTORS
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.settings import Settings
-from jaxbiped.mission.state import World
-from jaxbiped.motion.primitives import Command
+from jaxbiped.mission.config import SIMULATED
 from jaxbiped.motion.robot import STEP_TOLERANCE
 
 CHECKS = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
@@ -36,7 +38,63 @@ class Execution:
     outside: Bool[Array, "*B"]
 
 
-class Executor(Protocol):
-    """Plays one command of one arena."""
+class Executor:
+    """The base of executors: a frozen dataclass that is a pytree, as planners are. It is written for one robot."""
 
-    def __call__(self, arena: Arena, world: World, command: Command, settings: Settings) -> Execution: ...
+    places_feet: ClassVar[bool] = False  # whether feet are placed by measured edges, where the config does not say
+    on_terrain: ClassVar[bool] = False  # it knows arenas with terrain
+
+    def execute(self, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
+        """What comes of one `Command` in an `Arena`, from the `World` before it.
+
+        Noise is a function of `world.seed` and `world.decisions` alone (`core` `fold`): the same for every batch.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no method `execute`")
+
+
+def as_executor(thing: object, name: str) -> Executor:
+    """An executor of something that stands for one: an executor or its class.
+
+    Raises:
+      InputError: anything else.
+    """
+    if isinstance(thing, type) and issubclass(thing, Executor):
+        thing = thing()
+    check_component(thing, Executor, f"executor {name}")
+    return thing
+
+
+def find_executor(name: str) -> Executor | None:
+    """The executor of a name in the registry, or of `package.module:name`, which is imported; None: a simulated biped.
+
+    Raises:
+      InputError: a name that is not known, with those that are; a module that cannot be imported.
+    """
+    from jaxbiped.mission import executors  # noqa: F401  registers those that are built in
+
+    return None if name in SIMULATED else EXECUTORS.find(name, as_executor)
+
+
+WANTED = {"moved": ((3,), "f"), "variances": ((3,), "f"), "time": ((), "f"), "distance": ((), "f")}
+WANTED |= {name: ((), "b") for name in ("collided", "fell", "outside")}
+
+
+def execution_of(executor: Executor, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
+    """What an executor makes of a command, checked.
+
+    Raises:
+      InputError: something that is no execution of one robot.
+    """
+    made = executor.execute(arena, world, command, settings)
+    where = f"executor {type(executor).__name__}"
+    if not isinstance(made, Execution):
+        raise InputError("its execute must return an Execution", field=where, value=type(made).__name__)
+    parts = {name: (getattr(made, name), *wanted) for name, wanted in WANTED.items()}
+    parts |= {f"pose.{name}": (getattr(made.pose, name), (), "f") for name in ("x", "y", "z", "yaw")}
+    for name, (value, shape, kind) in parts.items():
+        found = jnp.shape(value), np.dtype(jnp.result_type(value)).kind
+        if found != (shape, kind):
+            wanted = f"{'truth values' if kind == 'b' else 'real numbers'} of shape {list(shape)}"
+            message = f"gave {jnp.result_type(value)}{list(found[0])} where {wanted} are wanted"
+            raise InputError(message, field=f"{where}: {name}")
+    return made

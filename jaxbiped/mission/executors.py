@@ -1,15 +1,19 @@
 """Executors play a command in the true world; the referee's rules for a nominal one.
 
-An executor is a function `(arena, world, command, settings) -> Execution`, for one arena. `kinematic` is the one that
-moves exactly as the primitives say; `sampled` moves as they were measured to; simulated bipeds are others.
+`kinematic` is the one that moves exactly as the primitives say; `sampled` moves as they were measured to; simulated
+bipeds are others, which are driven from the host. People may bring more (`execution.Executor`).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import jax
 import jax.numpy as jnp
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height, rises_near
+from jaxbiped.core.registry import EXECUTORS
 from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
@@ -69,4 +73,30 @@ def kinematic(arena: Arena, world: World, command: Command, settings: Settings) 
     )
 
 
-EXECUTORS: dict[str, Executor] = {"kinematic": kinematic, "sampled": sampled}
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Kinematic(Executor):
+    """Moves exactly as the primitives say; see `kinematic`."""
+
+    on_terrain = True
+
+    def execute(self, arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+        """See `Executor`."""
+        return kinematic(arena, world, command, settings)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Sampled(Executor):
+    """Moves as simulated bipeds were measured to; see `sampled`."""
+
+    places_feet, on_terrain = True, True
+
+    def execute(self, arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+        """See `Executor`."""
+        return sampled(arena, world, command, settings)
+
+
+BUILT_IN = {"kinematic": Kinematic(), "sampled": Sampled()}
+for _name, _executor in BUILT_IN.items():
+    EXECUTORS.add(_name, _executor)

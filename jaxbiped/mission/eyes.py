@@ -12,6 +12,7 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.config import RENDERED as RENDERED
 from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.settings import VISUAL, MissionConfig, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
@@ -20,8 +21,6 @@ from jaxbiped.sensing.hashing import fold
 from jaxbiped.sensing.noise import attitude_error
 from jaxbiped.sensing.shot import Shot
 from jaxbiped.sensing.view import Sightings, View
-
-RENDERED = ("stereo",)  # sensors that are no JAX
 
 
 @runtime_checkable

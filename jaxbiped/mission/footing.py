@@ -61,7 +61,7 @@ def look_for(about: Edge, crossing: Crossing, mind: Mind, view: View, settings: 
     bumps are parallel.
     """
     spec = program.spec
-    flat = mapping.level_view(view, mind.belief.pose.z, settings.mapping, spec) if program.sensor != "oracle" else view
+    flat = mapping.level_view(view, mind.belief.pose.z, settings.mapping, spec) if not program.knows_pose else view
     flat = jax.lax.optimization_barrier(flat)  # else the plane is fitted anew at every point
     eye, aside = mount(settings.camera, mind.look, mind.squat), jnp.clip(crossing.along, -SIDEWAYS, SIDEWAYS)
     turned = wrap_angle(mind.behind.angle - about.angle)

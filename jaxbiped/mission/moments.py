@@ -46,7 +46,7 @@ def as_mapped(
     """The points of a view as the map takes them [m, world as believed], which of them count, and occupied voxels."""
     spec, mapping = program.spec, settings.mapping
     view, evidence, pose = jax.tree.map(lambda leaf: leaf[0], (thought.view, thought.evidence, thought.pose))
-    if program.sensor != "oracle":
+    if not program.knows_pose:
         view = level_view(view, pose.z, mapping, spec)
     points = jnp.stack([*to_world(pose, view.x, view.y), view.z + pose.z], axis=-1)
     counts = (view.weight > 0) & (view.x**2 + view.y**2 < mapping.max_range**2) & jnp.all(jnp.isfinite(points), axis=-1)

@@ -55,20 +55,26 @@ class Result:
     pose_error: Float[Array, "N"]  # [m] from where the robot believed to stand, at the end
     yaw_error: Float[Array, "N"]  # [rad] the same of its yaw
     planned: Planned
+    metrics: tuple = ()  # what each metric remembers at the end
 
 
 def ending(world: World, goal_xy: Float[Array | np.ndarray, "*N 2"]) -> Result:
     """How missions ended whose worlds these are, in arenas with these goals."""
     away = jnp.hypot(goal_xy[..., 0] - world.pose.x, goal_xy[..., 1] - world.pose.y)
     done = world.code, world.distance, world.time, world.measurements, world.decisions
-    return Result(*done, away, world.pose_error, world.yaw_error, world.planned)
+    return Result(*done, away, world.pose_error, world.yaw_error, world.planned, world.metrics)
 
 
-def no_results(*shape: int) -> Result:
-    """Zeros, on the host."""
+def no_results(*shape: int, metrics: tuple = ()) -> Result:
+    """Zeros, on the host.
+
+    Args:
+      metrics: arrays, or their shapes and types, of what the metrics of one mission remember.
+    """
     kinds = int, float, float, int, int, float, float, float
     planned = Planned(*(np.zeros(shape, kind) for kind in (float, int, float)))
-    return Result(*(np.zeros(shape, kind) for kind in kinds), planned)
+    remembered = jax.tree.map(lambda leaf: np.zeros((*shape, *leaf.shape), leaf.dtype), metrics)
+    return Result(*(np.zeros(shape, kind) for kind in kinds), planned, remembered)
 
 
 @jax.tree_util.register_dataclass
@@ -185,7 +191,8 @@ def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots:
     world, mind = begin(arenas, settings, jobs, job, program)
     zero, none = jnp.zeros(jobs.arena.shape), jnp.zeros(jobs.arena.shape, jnp.int32)
     planned = Planned(zero, none, zero)
-    result = Result(none + Code.RUNNING, zero, zero, none, none, zero, zero, zero, planned)
+    metrics = jax.tree.map(lambda leaf: jnp.zeros((*zero.shape, *leaf.shape[1:]), leaf.dtype), world.metrics)
+    result = Result(none + Code.RUNNING, zero, zero, none, none, zero, zero, zero, planned, metrics)
     return Queue(world, mind, job, jnp.int32(slots), result)
 
 

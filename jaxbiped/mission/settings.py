@@ -5,13 +5,14 @@ from __future__ import annotations
 import functools
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float, Int
 
 from jaxbiped.config import Model
+from jaxbiped.core.component import traced_component as traced_component
 from jaxbiped.geometry.height_field import HeightField, height_range
 from jaxbiped.mapping import Body, GridSpec, MapParams
 from jaxbiped.mission.config import BELOW_POINTS as BELOW_POINTS
@@ -23,7 +24,10 @@ from jaxbiped.mission.config import VISUAL as VISUAL
 from jaxbiped.mission.config import CostConfig as CostConfig
 from jaxbiped.mission.config import LimitConfig as LimitConfig
 from jaxbiped.mission.config import MissionConfig as MissionConfig
+from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.library import Library, load_library
+from jaxbiped.mission.metric import Metric
+from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, StrategyFlags, find_strategy
 from jaxbiped.motion.primitives import Durations
 from jaxbiped.motion.robot import Footing
@@ -70,6 +74,9 @@ class Settings:
     library: Library
     footing: Footing
     limits: Limits
+    metrics: tuple[Metric, ...] = ()  # that rows shall have beside what every mission has
+    sensor: Any = None  # `Sensor`; None: on the host
+    executor: Any = None  # `Executor`; None: a simulated biped
 
 
 @dataclass(frozen=True)
@@ -83,29 +90,29 @@ class Program:
     footing: bool = False  # feet are placed by measured edges; else by cells alone
     localisation: str = "landmarks"
     fading: bool = False  # the map forgets what has moved
+    knows_pose: bool = False  # the robot does, and its points have no attitude error to take out
 
 
 def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> Program:
     """The static part of a config for arenas of one size [m], and with such terrain, whose heights are concrete."""
     heights = (0.0, 0.0) if terrain is None else height_range(terrain)
-    footing = config.executor != "kinematic" if config.foot_placement is None else config.foot_placement
+    sensor, executor = find_sensor(config.sensor), find_executor(config.executor)
+    places_feet = True if executor is None else executor.places_feet
+    footing = places_feet if config.foot_placement is None else config.foot_placement
+    knows_pose = sensor is not None and sensor.knows_pose
     return Program(
         config.grid(size_xy, heights),
         config.camera.image,
         config.sensor,
         config.executor,
         footing,
-        localisation="landmarks" if config.sensor == "oracle" else config.localisation,
+        localisation="landmarks" if knows_pose else config.localisation,
         fading=config.mapping.fade is not None,
+        knows_pose=knows_pose,
     )
 
 
 PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # of strategies that bring none of their own
-
-
-def traced_planner(planner: Planner) -> Planner:
-    """A planner with its numbers as arrays of the types that programs compute with."""
-    return jax.tree.map(lambda leaf: np.asarray(leaf, jax.dtypes.canonicalize_dtype(np.asarray(leaf).dtype)), planner)
 
 
 def settings_of(config: MissionConfig, strategy: str | Strategy) -> Settings:
@@ -115,7 +122,7 @@ def settings_of(config: MissionConfig, strategy: str | Strategy) -> Settings:
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
     return Settings(
         strategy=strategy.flags(config.corner_cutting),
-        planner=PLANNERS[config.planner] if strategy.planner is None else traced_planner(strategy.planner),
+        planner=PLANNERS[config.planner] if strategy.planner is None else traced_component(strategy.planner),
         costs=numbers(config.costs),
         durations=numbers(config.durations),
         body=numbers(config.robot, "body"),
@@ -137,6 +144,8 @@ def settings_of(config: MissionConfig, strategy: str | Strategy) -> Settings:
             rise=jnp.float32(GridSpec().level_height),
             start_variance=jnp.array([sd**2, sd**2, sd_yaw**2], jnp.float32),
         ),
+        sensor=traced_component(find_sensor(config.sensor)),
+        executor=traced_component(find_executor(config.executor)),
     )
 
 

@@ -15,6 +15,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridMap, GridSpec, empty
 from jaxbiped.mapping.scan_match import Outlines, no_outlines
+from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import ICP, VISUAL, Settings
 from jaxbiped.sensing.edges import Edge, unknown
@@ -48,6 +49,7 @@ class World:
     yaw_error: Float[Array, "*B"]  # [rad] the same of its yaw, without sign
     planned: Planned
     before: Pose | None = None  # where it stood one command earlier; only where its motion is measured
+    metrics: tuple = ()  # what each metric of the settings remembers
 
 
 @jax.tree_util.register_dataclass
@@ -110,7 +112,8 @@ def start(
     visual = localisation in VISUAL
     none = jnp.zeros(())
     planned = Planned(none, zero, jnp.full_like(none, jnp.nan))
-    world = World(pose, no, none, none, zero, zero, code, seed, none, none, planned, pose if visual else None)
+    metrics = begun(settings.metrics, arena, settings)
+    world = World(pose, no, none, none, zero, zero, code, seed, none, none, planned, pose if visual else None, metrics)
     belief = Belief(pose, jnp.diag(settings.limits.start_variance))
     outlines = no_outlines(spec) if localisation in ICP else None
     anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None

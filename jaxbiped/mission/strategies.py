@@ -9,6 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
+from jaxbiped.core.component import check_component
 from jaxbiped.core.registry import STRATEGIES
 from jaxbiped.errors import InputError
 from jaxbiped.planning import Rules
@@ -51,31 +52,12 @@ class Strategy:
             message = "must begin with a letter and have at most 40 letters, digits, blanks and . _ + -"
             raise InputError(message, field="name of a strategy", value=self.name)
         if self.planner is not None:
-            check_planner(self.planner, self.name)
+            hint = "; wrap a function of NumPy arrays in HostPlanner"
+            check_component(self.planner, Planner, f"planner of {self.name}", hint)
 
     def flags(self, corner_cutting: bool = False) -> StrategyFlags:
         """The traced part."""
         return StrategyFlags(*(jnp.asarray(v) for v in (self.bumps, self.gates, self.blind, corner_cutting)))
-
-
-def check_planner(planner: object, name: str) -> None:
-    """Raise `InputError` unless an object can plan inside a compiled program."""
-    where, kind = f"planner of {name}", type(planner).__name__
-    if not isinstance(planner, Planner):
-        raise InputError(f"must be a Planner, not {kind}; wrap a function of NumPy arrays in HostPlanner", field=where)
-    leaves, structure = jax.tree.flatten(planner)
-    if len(leaves) == 1 and leaves[0] is planner:
-        raise InputError(f"{kind} is no pytree; decorate it with jax.tree_util.register_dataclass", field=where)
-    for leaf in leaves:
-        try:
-            jnp.asarray(leaf)
-        except TypeError:
-            message = f"{kind} holds a {type(leaf).__name__}; what is no number must be a static field"
-            raise InputError(message, field=where) from None
-    try:
-        hash(structure)
-    except TypeError:
-        raise InputError(f"{kind} has a static field that cannot be hashed", field=where) from None
 
 
 # The bracketed works are those of the paper's Table 1.

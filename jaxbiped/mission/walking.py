@@ -157,10 +157,10 @@ class Walkers:
         self.tapes = [self.stage.rest(False)] * size
         self.place, self.length = np.zeros((2, size), int)  # on the tape; beyond its end the last row is held
         jobs_in_all = len(self.arena_of)
-        self.result = no_results(jobs_in_all)
-        self.result.code[:] = Code.RUNNING
         self.goals = np.asarray(arenas.goal_xy)
         self.world, self.mind = fresh(arenas, settings, jobs, jnp.asarray(self.job), program)
+        self.result = no_results(jobs_in_all, metrics=jax.tree.map(lambda leaf: leaf[0], self.world.metrics))
+        self.result.code[:] = Code.RUNNING
         self.plan = no_plan(size)
         self.enter(np.ones(size, bool))
 

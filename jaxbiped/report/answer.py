@@ -3,47 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from jaxbiped.report.measures import DISTANCE as DISTANCE
+from jaxbiped.report.measures import MEASURES as MEASURES
+from jaxbiped.report.measures import SUCCESS as SUCCESS
+from jaxbiped.report.measures import TIME as TIME
+from jaxbiped.report.measures import Measure as Measure
 from jaxbiped.report.words import AHEAD, BEHIND, OPEN, interval, p_value, percent, signed
 from jaxbiped.study import ALL, Comparison, Estimate, PairComparison, PairedMetric
+from jaxbiped.study.intervals import NOTHING
 
 ALPHA = 0.05
-
-
-@dataclass(frozen=True)
-class Measure:
-    """One thing that strategies are compared by, and how it is said."""
-
-    name: str
-    unit: str  # for people
-    scale: float  # from SI to that unit
-    digits: int
-    more: str  # what a greater value means
-    less: str
-    smaller_is_better: bool
-
-
-SUCCESS = Measure("success", "points", 100.0, 1, "more often", "less often", False)
-DISTANCE = Measure("distance", "cm", 100.0, 1, "more", "less", True)
-TIME = Measure("time", "min", 1 / 60, 2, "more", "less", True)
-MEASURES = (SUCCESS, DISTANCE, TIME)
 
 
 def part(pair: PairComparison, measure: Measure) -> tuple[Estimate, float | None]:
     """The difference of a measure with its interval, and its corrected p."""
     if measure is SUCCESS:
         return pair.success, pair.success.p_holm
-    metric: PairedMetric = getattr(pair, measure.name)
-    return metric.mean, metric.p_holm
+    metric = paired_metric(pair, measure)
+    return (metric.mean, metric.p_holm) if metric else (NOTHING, None)
+
+
+def paired_metric(pair: PairComparison, measure: Measure) -> PairedMetric | None:
+    """The pair's numbers of a measure that is not success; None where they were not asked for."""
+    return pair.metrics.get(measure.name) if measure not in MEASURES else getattr(pair, measure.name)
 
 
 def ranks_disagree(pair: PairComparison, measure: Measure) -> bool:
     """Whether the first is smaller on most arenas and yet greater on average, or the other way round."""
     if measure is SUCCESS:
         return False
-    metric: PairedMetric = getattr(pair, measure.name)
-    return metric.mean.valid and (metric.improvement.estimate - 0.5) * metric.mean.estimate > 0
+    metric = paired_metric(pair, measure)
+    return metric is not None and metric.mean.valid and (metric.improvement.estimate - 0.5) * metric.mean.estimate > 0
 
 
 def verdict(pair: PairComparison, measure: Measure, alpha: float = ALPHA) -> str:

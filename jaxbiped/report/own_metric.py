@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from jaxbiped.report.answer import MEASURES
 from jaxbiped.report.figures import canvas, error_bars, legend_above, look
+from jaxbiped.report.measures import metric_measure
 from jaxbiped.report.style import own_style
 from jaxbiped.report.sweep_figures import scale_x
 from jaxbiped.study.intervals import Estimate, mean_and_median, proportion
@@ -36,7 +37,7 @@ def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str, size: tupl
       points: as `store.read_points` gives them, with one swept field at most.
       size: [inch] width and height.
     """
-    measure = next(item for item in MEASURES if item.name == metric)
+    measure = next((item for item in MEASURES if item.name == metric), None) or metric_measure(metric)
     strategies, fields = ordered(rows["strategy"].unique()), [name for name in points.columns if name != "point"]
     figure, ax = canvas(*size)
     places = points[fields[0]].to_numpy() if fields else np.zeros(1)
@@ -59,7 +60,6 @@ def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str, size: tupl
     else:
         ax.set_xticks(range(len(strategies)), strategies, rotation=20 if len(strategies) > 4 else 0)
         ax.set_xlim(-0.5, len(strategies) - 0.5)
-    ax.set_ylabel(
-        "reached the goal [%]" if metric == "success" else f"mean {measure.name} where reached [{measure.unit}]"
-    )
+    unit, where = f" [{measure.unit}]" if measure.unit else "", " where reached" if measure in MEASURES else ""
+    ax.set_ylabel("reached the goal [%]" if metric == "success" else f"mean {measure.name}{where}{unit}")
     return figure

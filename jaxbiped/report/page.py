@@ -15,6 +15,8 @@ from jaxbiped.report.grid import Grid, to_grid, typeset
 from jaxbiped.report.plots import Plot, attribution_sheet, plots
 from jaxbiped.report.tables import (
     code_sheet,
+    metric_sheet,
+    metric_stratum_sheet,
     pair_sheet,
     strategy_sheets,
     stratum_sheet,
@@ -111,9 +113,14 @@ def sections(frame: pl.DataFrame, comparison: Comparison) -> tuple[Section, ...]
     ]
     if comparison.question:
         first, second = comparison.question
-        pairs = to_grid(pair_sheet(comparison))
-        found.append(Section("On the same arenas", plots=tuple(drawn["strata"] + drawn["pair"]), grids=(pairs,)))
-        strata = tuple(to_grid(stratum_sheet(comparison, first, second, kind)) for kind in kinds)
+        pairs = [pair_sheet(comparison)]
+        sheets = [stratum_sheet(comparison, first, second, kind) for kind in kinds]
+        if comparison.metrics:
+            pairs.append(metric_sheet(comparison, first, second))
+            sheets += [metric_stratum_sheet(comparison, first, second, kind) for kind in kinds]
+        grids = tuple(map(to_grid, pairs))
+        found.append(Section("On the same arenas", plots=tuple(drawn["strata"] + drawn["pair"]), grids=grids))
+        strata = tuple(map(to_grid, sheets))
         rates = tuple(to_grid(success_sheet(comparison, kind)) for kind in kinds)
         found.append(Section("Where it differs", grids=strata + rates))
     tables = [code_sheet(comparison)]

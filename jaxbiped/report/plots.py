@@ -9,8 +9,9 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
-from jaxbiped.report.answer import MEASURES, SUCCESS, Measure, part, verdict
+from jaxbiped.report.answer import MEASURES, Measure, part, verdict
 from jaxbiped.report.figures import CODE_COLOURS, canvas, difficulty, forest_row, legend_above, look, times
+from jaxbiped.report.measures import metric_measures
 from jaxbiped.report.svg import INK, LINE, inline, themed
 from jaxbiped.report.tables import Sheet
 from jaxbiped.report.words import OPEN
@@ -48,7 +49,7 @@ def plots(frame: pl.DataFrame, comparison: Comparison) -> dict[str, list[Plot]]:
         add("strategies", "difficulty", difficulty(frame, comparison, (WIDTH, 3.6)), caption)
         if comparison.question:
             first, second = comparison.question
-            for measure in MEASURES:
+            for measure in (*MEASURES, *metric_measures(comparison)):
                 caption = (
                     f"Difference in {measure.name}, {first} less {second}, with its interval. Filled: shown after "
                 )
@@ -101,9 +102,9 @@ def forest(comparison: Comparison, first: str, second: str, measure: Measure) ->
     ax.set_xlim(-spread, spread)
     ax.set_yticks(range(count), names)
     ax.set_ylim(count - 0.4, -0.6)
-    left, right = (second, first) if measure is SUCCESS else (first, second)
+    left, right = (first, second) if measure.smaller_is_better else (second, first)
     ax.set_xlabel(f"← {left} better\u2003\u2003{right} better →")
-    ax.set_title(f"{measure.name} [{measure.unit}]")
+    ax.set_title(f"{measure.name} [{measure.unit}]" if measure.unit else measure.name)
     ax.tick_params(axis="y", length=0)
     return figure
 

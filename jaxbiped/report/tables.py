@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from jaxbiped.report.answer import ALPHA, DISTANCE, MEASURES, SUCCESS, TIME, answer, part
+from jaxbiped.report.measures import metric_measures
 from jaxbiped.report.words import NONE, brackets, number, p_cell, percent, signed
 from jaxbiped.study import ALL, CODES, Comparison, Estimate, PairComparison, PairedMetric
 
@@ -66,6 +67,8 @@ def comparison_table(comparison: Comparison) -> Table:
 def terminal(comparison: Comparison) -> Group:
     """What a comparison prints, 80 columns wide: strategies, failures, pairs, the question by family, the answer."""
     sheets = [*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison, detailed=1)]
+    if comparison.question and comparison.metrics:
+        sheets.append(metric_sheet(comparison, *comparison.question))
     if comparison.question and len(comparison.strata("family")) > 1:
         sheets.append(short_stratum_sheet(comparison, *comparison.question, "family"))
     blocks: list[RenderableType] = []
@@ -79,10 +82,14 @@ def markdown_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
     """All tables of a comparison, in the order of `summary.md`."""
     sheets = [*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison)]
     pairs = dict.fromkeys((pair.first, pair.second) for pair in comparison.pairs)
+    if comparison.metrics:
+        sheets += [metric_sheet(comparison, first, second) for first, second in pairs]
     for kind in ("family", "difficulty"):
         if len(comparison.strata(kind)) > 1:
             sheets.append(success_sheet(comparison, kind))
             sheets += [stratum_sheet(comparison, first, second, kind) for first, second in pairs]
+            if comparison.question and comparison.metrics:
+                sheets.append(metric_stratum_sheet(comparison, *comparison.question, kind))
     return tuple(sheet for sheet in sheets if sheet.groups)
 
 
@@ -177,6 +184,46 @@ def pair_rows(pair: PairComparison, detailed: bool) -> list[Row]:
             limits = brackets(chance, 100.0, 0, sign=False)
             rows.append((better, str(metric.n), percent(chance.estimate, 0), limits, f"{metric.zeros} ties"))
     return rows
+
+
+def metric_sheet(comparison: Comparison, first: str, second: str) -> Sheet:
+    """Metrics beside success, distance and time: their means by strategy, and a pair's differences."""
+    pair, rows = comparison.pair(first, second), []
+    for measure in metric_measures(comparison):
+        difference, p = part(pair, measure)
+        own = [
+            scaled(comparison.summary(name).metrics[measure.name].estimate, measure, measure.digits)
+            for name in (first, second)
+        ]
+        value = signed(difference.estimate * measure.scale if difference.valid else None, measure.digits)
+        limits = brackets(difference, measure.scale, measure.digits)
+        rows.append(
+            (measure.title, *own, str(difference.n), value if limits == NONE else f"{value} {limits}", p_cell(p))
+        )
+    columns = ("metric", first, second, "both", "difference", "p")
+    notes = (
+        f"Means over a strategy's own missions that have the number, then differences where both have it, with "
+        f"{100 * comparison.level:g} % intervals and p-values corrected by Holm's method for this table.",
+        "spl: success weighted by path length; clearance: the least distance from boxes; replans: plans but the first; "
+        "measuring: the share of time spent so.",
+    )
+    return Sheet(f"Other metrics: {first} - {second}", columns, (tuple(rows),), notes)
+
+
+def metric_stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
+    """A pair's differences in these metrics in every stratum of a kind: a row each."""
+    measures, rows = metric_measures(comparison), []
+    for stratum in (ALL, *comparison.strata(kind)):
+        cells = [stratum.name]
+        for measure in measures:
+            difference, p = part(comparison.pair(first, second, stratum), measure)
+            value = signed(difference.estimate * measure.scale if difference.valid else None, measure.digits)
+            limits = brackets(difference, measure.scale, measure.digits)
+            cells += [str(difference.n), value if limits == NONE else f"{value} {limits}", p_cell(p)]
+        rows.append(tuple(cells))
+    columns = (kind, *(cell for measure in measures for cell in ("both", measure.title, "p")))
+    notes = (f"Differences, first minus second; p-values corrected by Holm's method within {kind} tables of metrics.",)
+    return Sheet(f"Other metrics, {first} - {second} by {kind}", columns, (tuple(rows[:1]), tuple(rows[1:])), notes)
 
 
 def short_stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:

@@ -8,19 +8,25 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import polars as pl
 
 from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.arenas.source import OwnFamily, find_family
 from jaxbiped.config import parse
+from jaxbiped.core.code_hash import component_hash
+from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
 from jaxbiped.core.registry import FAMILIES
+from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.errors import InputError
+from jaxbiped.mission.config import EXECUTORS, SENSORS
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.study.arena_kinds import kinds_of
 from jaxbiped.study.comparison import paired
-from jaxbiped.study.components import FAMILY, hash_of
+from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
 from jaxbiped.study.evaluate import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
 from jaxbiped.study.runner import check_mission, play_one, seeing
@@ -102,13 +108,21 @@ def play_again(
     """
     again = strategy_again(manifest, strategy, own or {})
     config, families, population = mission_of(manifest, point, values)
+    for kind, name, known in ((SENSOR, config.sensor, SENSORS), (EXECUTOR, config.executor, EXECUTORS)):
+        same_component(manifest, kind, name, known)
     populations = None if population == PopulationConfig() else stack([population.traced()])
     families = families_again(manifest, families)
-    batch, seeds = draw(jax.random.key(manifest.seed), jnp.asarray(arenas), families, populations)
     check_mission(config)
-    each = [jax.tree.map(lambda leaf, k=k: leaf[k], batch) for k in range(len(arenas))]
+    key, played = jax.random.key(manifest.seed), {}
     with seeing(config) as eyes:
-        return [play_one(arena, config, again, seed, eyes=eyes) for arena, seed in zip(each, seeds, strict=True)]
+        for kind in kinds_of(families):
+            mine = np.array([k for k in arenas if k % kind.number in kind.places], int)
+            if len(mine):
+                batch, seeds = draw(key, jnp.asarray(mine), kind.families, populations, jnp.asarray(kind.turns(mine)))
+                for row, k in enumerate(mine):
+                    arena = jax.tree.map(lambda leaf, row=row: leaf[row], batch)
+                    played[int(k)] = play_one(arena, config, again, seeds[row], eyes=eyes)
+    return [played[int(k)] for k in arenas]
 
 
 def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -> Strategy:
@@ -121,6 +135,17 @@ def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -
     if hash_of(own[name]) != manifest.config.get("components", {}).get(name):
         raise InputError("has other code or other numbers than in the study", field="strategy", value=name)
     return own[name]
+
+
+def same_component(manifest: Manifest, kind: str, name: str, built_in: Sequence[str]) -> None:
+    """Raise `InputError` unless a sensor or an executor is built in, or registered and as the study tells."""
+    if name in built_in:
+        return
+    registry = SENSORS_OWN if kind == SENSOR else EXECUTORS_OWN
+    if name not in registry:
+        raise InputError("is not built in: only a program that registers it can play it again", field=kind, value=name)
+    if component_hash(registry.held[name]) != manifest.config.get("components", {}).get(f"{kind} {name}"):
+        raise InputError("has other code or other numbers than in the study", field=kind, value=name)
 
 
 def families_again(manifest: Manifest, names: Sequence[str]) -> tuple[str | OwnFamily, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import polars as pl
@@ -12,8 +12,9 @@ from jaxtyping import Float
 
 from jaxbiped.errors import InputError
 from jaxbiped.study.intervals import NOTHING, Estimate, mean_and_median, proportion
+from jaxbiped.study.metric_pairs import corrected_metrics, metric_means, metric_pairs
 from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
-from jaxbiped.study.schema import CODES, ordered, ordered_families, validate
+from jaxbiped.study.schema import CODES, metric_columns, ordered, ordered_families, validate
 
 OWN = 1  # of the seed of bootstraps that are of one strategy alone
 QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about
@@ -44,6 +45,7 @@ class StrategySummary:
     distance: Estimate  # [m] mean over its own reached missions: other arenas than another strategy's. It has an
     # interval over all arenas; in families and thirds there are too many of them to compute
     time: Estimate  # [s] the same
+    metrics: dict[str, Estimate] = field(default_factory=dict)  # of each other column: mean over missions that have it
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class PairComparison:
     second_only: int
     distance: PairedMetric  # [m]
     time: PairedMetric  # [s]
+    metrics: dict[str, PairedMetric] = field(default_factory=dict)  # of each other column, where both have it
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,11 @@ class Comparison:
     strategies: tuple[str, ...]
     summaries: tuple[StrategySummary, ...]
     pairs: tuple[PairComparison, ...]
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """The columns beside success, distance and time that strategies were compared by."""
+        return tuple(self.summaries[0].metrics) if self.summaries else ()
 
     @property
     def question(self) -> tuple[str, str] | None:
@@ -139,7 +147,8 @@ def compare_named(
     """Compare whatever the column `strategy` names, arena by arena.
 
     Holm's correction runs over all p-values of a table: success, distance and time of all pairs, over all arenas, over
-    all families together, and over all difficulties together.
+    all families together, and over all difficulties together. Other metrics are compared over all arenas, the first
+    pair in every stratum, too; they have a correction of their own, so that adding one changes no other p-value.
 
     Args:
       frame: the columns of `schema.SCHEMA`; a row for each arena and name, at most.
@@ -148,15 +157,21 @@ def compare_named(
     strategies = tuple(names)
     rng = np.random.default_rng(seed)
     own = {"seed": int(np.random.default_rng([seed, OWN]).integers(2**32)), "resamples": resamples}
-    summaries, compared = [], []
+    summaries, compared, others = [], [], metric_columns(frame)
+    leading = QUESTION if QUESTION in pairs else next(iter(pairs), None)
     for stratum, rows in strata(frame):
         by_name = {name: rows.filter(pl.col("strategy") == name) for name in strategies}
         of_means = own if stratum == ALL else None
         summaries += [summarise(stratum, name, by_name[name], level, of_means) for name in strategies]
         for first, second in pairs:
             options = {"seed": int(rng.integers(2**32)), "resamples": resamples, "level": level}
-            compared.append(compare_pair(stratum, (first, by_name[first]), (second, by_name[second]), **options))
-    return Comparison(point, level, seed, resamples, strategies, tuple(summaries), corrected(compared))
+            pair = compare_pair(stratum, (first, by_name[first]), (second, by_name[second]), **options)
+            if stratum == ALL or (first, second) == leading:
+                pair = replace(pair, metrics=metric_pairs(by_name[first], by_name[second], others, **options))
+            compared.append(pair)
+    return Comparison(
+        point, level, seed, resamples, strategies, tuple(summaries), corrected_metrics(corrected(compared))
+    )
 
 
 def strata(frame: pl.DataFrame) -> Iterator[tuple[Stratum, pl.DataFrame]]:
@@ -195,6 +210,7 @@ def summarise(
         reachable=proportion(len(reachable), len(rows), level),
         success_of_reachable=proportion(int(reachable["success"].sum()), len(reachable), level),
         codes=tuple(counts.get(code, 0) for code in CODES),
+        metrics=metric_means(rows, metric_columns(rows)),
         **means,
     )
 

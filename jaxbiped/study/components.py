@@ -1,4 +1,4 @@
-"""What people brought to a study: strategies and families that are not built in, and a hash of each one's code."""
+"""What people brought to a study: its components that are not built in, and a hash of each."""
 
 from __future__ import annotations
 
@@ -6,11 +6,15 @@ from typing import TypeVar
 
 from jaxbiped.arenas.source import find_family
 from jaxbiped.core.code_hash import component_hash
+from jaxbiped.mission.config import EXECUTORS, SENSORS
+from jaxbiped.mission.execution import find_executor
+from jaxbiped.mission.metric import column_of, find_metric
+from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.schema import STRATEGIES
+from jaxbiped.study.names import METRICS, STRATEGIES
 
-FAMILY = "family"  # before the names of families
+FAMILY, METRIC, SENSOR, EXECUTOR = "family", "metric", "sensor", "executor"  # before the names of these
 
 C = TypeVar("C", bound=StudyConfig)
 
@@ -25,7 +29,7 @@ def fingerprinted(config: C) -> C:
     """The config with `components` filled in, so that its hash covers the code of what people brought.
 
     Raises:
-      InputError: a strategy or family that is not known, or whose module or file cannot be used.
+      InputError: a component that is not known, or whose module or file cannot be used.
     """
     own = [find_strategy(name) for name in config.strategies if name not in STRATEGIES]
     made = {item.name: hash_of(item) for item in own}
@@ -33,4 +37,13 @@ def fingerprinted(config: C) -> C:
         family = find_family(name)
         if not isinstance(family, str):
             made[f"{FAMILY} {family.name}"] = family.digest()
+    for name in config.metrics:
+        if name not in METRICS:
+            made[f"{METRIC} {column_of(name)}"] = component_hash(find_metric(name))
+    for kind, name, built_in, find in (
+        (SENSOR, config.mission.sensor, SENSORS, find_sensor),
+        (EXECUTOR, config.mission.executor, EXECUTORS, find_executor),
+    ):
+        if name not in built_in:
+            made[f"{kind} {name}"] = component_hash(find(name))
     return config if made == config.components else config.model_copy(update={"components": made})

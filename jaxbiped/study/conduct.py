@@ -52,6 +52,7 @@ def conduct(
     compile_time = compile_time or (lambda: clock.seconds)
     swept = points is not None
     points = tuple(points) if swept else only_point(config)
+    groups = groups_of(config, points)  # refuses what does not go together before anything is written
     kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
     kind["device_name"] = device
     if resume:
@@ -59,7 +60,7 @@ def conduct(
     else:
         results = store.create(folder, config, **kind)
     with results:
-        judge = in_order(enough, parts=1 if swept else len(groups_of(config, points)))
+        judge = in_order(enough, parts=1 if swept else len(groups))
         paths = store.shard_paths(results.folder) if enough is not never else []
         if not any(judge(store.shard_number(path), pl.read_parquet(path)) for path in paths):
             for shard, frame in engine(config, on_progress, points=points if swept else None, done=results.done()):
@@ -97,8 +98,8 @@ def in_order(enough: Callable[[pl.DataFrame], bool], parts: int = 1) -> Callable
 
 def shard_rows(config: StudyConfig, points: Sequence[Point], *, swept: bool = False) -> list[int]:
     """Rows of each shard, by its number."""
-    sizes = [len(group.points) * len(group.strategies) for group in groups_of(config, points)]
-    return [shard.count * sizes[shard.group] for shard in shards(config, len(sizes), swept=swept)]
+    groups = groups_of(config, points)
+    return [groups[shard.group].rows(shard) for shard in shards(config, len(groups), swept=swept)]
 
 
 def table(points: Sequence[Point]) -> pl.DataFrame:

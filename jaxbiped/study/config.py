@@ -10,10 +10,13 @@ import tyro
 from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
 from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
+from jaxbiped.core.registry import METRICS as METRICS_OWN
 from jaxbiped.core.registry import PLACE
 from jaxbiped.core.registry import STRATEGIES as REGISTERED
 from jaxbiped.mission.config import SIMULATED, MissionConfig
-from jaxbiped.study.names import FAMILIES, KNOWN, MOVING, STRATEGIES
+from jaxbiped.study.names import FAMILIES, KNOWN, METRICS, MOVING, STRATEGIES
+
+OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # what the names of components' numbers begin with
 
 
 def known_family(name: str) -> str:
@@ -39,6 +42,17 @@ def known_strategy(name: str) -> str:
 StrategyName = Annotated[str, pydantic.AfterValidator(known_strategy)]
 
 
+def known_metric(name: str) -> str:
+    """The same of a metric."""
+    if not (name in METRICS or METRICS_OWN.knows(name) or PLACE.fullmatch(name)):
+        known = ", ".join(dict.fromkeys([*METRICS, *METRICS_OWN]))
+        raise ValueError(f"must be one of {known}, or package.module:name of your own metric")
+    return name
+
+
+MetricName = Annotated[str, pydantic.AfterValidator(known_metric)]
+
+
 class StudyConfig(Model):
     """Strategies compared on the same random arenas."""
 
@@ -52,8 +66,13 @@ class StudyConfig(Model):
     scene file is a family with one arena."""
     strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
     """Those that are compared, by default all below."""
+    metrics: tuple[MetricName, ...] = METRICS
+    """Columns beside those that all rows have: path efficiency (spl), the least distance from boxes (clearance), plans
+    but the first (replans), the share of time spent measuring; or your own, as package.module:name."""
+    numbers: dict[str, float] = pydantic.Field(default_factory=dict)
+    """Of your own components, in place of their defaults: planner.clearance, sensor.reach or executor.slip, say."""
     components: Annotated[dict[str, str], tyro.conf.Fixed] = pydantic.Field(default_factory=dict)
-    """A hash of the code and the numbers of each strategy that is not built in; filled in when the study begins."""
+    """A hash of the code and the numbers of each component that is not built in; filled in when the study begins."""
     shard: Annotated[int, pydantic.Field(ge=1, le=65536)] = 1024
     """Arenas that are computed, and written, together."""
     population: PopulationConfig = PopulationConfig()
@@ -62,9 +81,12 @@ class StudyConfig(Model):
 
     @pydantic.model_validator(mode="after")
     def _distinct(self):
-        for name in ("families", "strategies"):
+        for name in ("families", "strategies", "metrics"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
                 raise ValueError(f"{name} must be named once each")
+        for name in self.numbers:
+            if not (name.startswith(OF_COMPONENTS) and name.partition(".")[2].isidentifier()):
+                raise ValueError(f"numbers: {name} must be planner.<field>, sensor.<field> or executor.<field>")
         for name, family in FAMILY_OF.items():
             if getattr(self.population, name) is not None and family not in self.families:
                 raise ValueError(f"population.{name} needs the family {family}")

@@ -16,7 +16,7 @@ from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
-from jaxbiped.arenas.source import OwnFamily, draw_arena, find_family, name_of
+from jaxbiped.arenas.source import OwnFamily, draw_arena, name_of
 from jaxbiped.devices import by_rows, mesh_of
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
@@ -35,6 +35,7 @@ from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
+from jaxbiped.study.metric_columns import check_metrics, metric_columns
 from jaxbiped.study.runner import batch_driver
 from jaxbiped.study.schema import SCHEMA
 
@@ -69,7 +70,7 @@ def evaluate(
     """
     groups = groups_of(config, points)
     left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
-    rows = [shard.count * len(groups[shard.group].population_of) for shard in left]
+    rows = [groups[shard.group].rows(shard) for shard in left]
     before, total = Tally(0, 0), sum(rows)
     for shard in left:
         last = [before]
@@ -93,17 +94,21 @@ def compute(
 ) -> pl.DataFrame:
     """The rows of one shard: a function of config, group and shard alone, whatever was computed before, and where."""
     # The last shard is filled up with arenas beyond the study, so that all shards share one program.
-    size = min(config.shard, config.arenas)
-    index = shard.first + jnp.arange(size)
-    families = tuple(map(find_family, config.families))
-    batch, seeds = draw(jax.random.key(config.seed), index, families, group.populations)
+    kind, count = group.kind, group.kind.count(shard.first, shard.count)
+    index = kind.indices(shard.first, min(config.shard, config.arenas))
+    if count == 0:
+        return pl.DataFrame(schema={**SCHEMA, **dict.fromkeys(group.metrics, pl.Float64)})
+    size, key = len(index), jax.random.key(config.seed)
+    turns = None if len(kind.places) == kind.number else jnp.asarray(kind.turns(index))
+    batch, seeds = draw(key, jnp.asarray(index), kind.families, group.populations, turns)
+    check_metrics(batch, group, size)
     with batch_driver(group, workers) as play:
-        result = play(
-            batch, seeds, group.settings, shard.count, group.static, on_progress, population_of=group.population_of
-        )
+        result = play(batch, seeds, group.settings, count, group.static, on_progress, population_of=group.population_of)
     batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
     plan = plan_all(batch, group, size)
-    return frame(np.arange(shard.first, shard.first + shard.count), batch, group, families, result, plan)
+    families = [kind.families[turn] for turn in kind.turns(index[:count])]
+    rows = frame(index[:count], batch, group, list(map(name_of, families)), result, plan)
+    return rows.with_columns(**metric_columns(batch, group, result, plan, size))
 
 
 @with_own_settings
@@ -113,15 +118,19 @@ def draw(
     index: Int[Array, "A"],
     families: tuple[str | OwnFamily, ...],
     populations: Population | None = None,
+    turns: Int[Array, "A"] | None = None,
 ) -> tuple[Arena, UInt32[Array, "A"]]:
     """Arenas `index` of the population, and the seeds of their missions' noise: the same for all strategies.
 
     Args:
       populations: leaves [U]; the arenas are then those of each of them, one after the other: [U * A].
+      turns: which of the families each is; by default its number modulo theirs.
     """
 
     def one(population: Population | None) -> Arena:
-        return jax.vmap(lambda k: draw_arena(key, k, families, population))(index)
+        if turns is None:
+            return jax.vmap(lambda k: draw_arena(key, k, families, population))(index)
+        return jax.vmap(lambda k, turn: draw_arena(key, k, families, population, turn))(index, turns)
 
     if populations is None:
         batch = one(None)
@@ -235,13 +244,17 @@ def frame(
     index: Int[np.ndarray, "A"],
     batch: Arena,
     group: Group,
-    families: Sequence[str | OwnFamily],
+    families: Sequence[str],
     result: Result,
     plan: OraclePlan,
 ) -> pl.DataFrame:
-    """Rows of all points and strategies on arenas `index`, the first of the batch, which is on the host."""
+    """Rows of all points and strategies on arenas `index`, the first of the batch, which is on the host.
+
+    Args:
+      families: the name of each arena's.
+    """
     count, kinds, strategies = len(index), len(group.population_of), group.strategies
-    family, difficulty = np.array(list(map(name_of, families)))[index % len(families)], batch.difficulty[:count]
+    family, difficulty = np.array(families, str), batch.difficulty[:count]
     reached = result.code == Code.REACHED
     reachable, cost, length = (values[:, :count] for values in (plan.reachable, plan.cost, plan.length))
     columns = {

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 
-import jax
 import numpy as np
 from jaxtyping import Int
 
-from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.population import Population, PopulationConfig
-from jaxbiped.arenas.source import OwnFamily, area_of, find_family, name_of
+from jaxbiped.arenas.source import OwnFamily, find_family, name_of
+from jaxbiped.core.component import kind_of, numbers_of, traced_component, with_numbers
 from jaxbiped.errors import InputError
+from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.footwork import WalkConfig
+from jaxbiped.mission.metric import Metric, column_of, find_metric
+from jaxbiped.mission.program_for import program_for
 from jaxbiped.mission.queue import stack
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings, program, traced_planner
+from jaxbiped.mission.sensors import find_sensor
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.strategies import Strategy, find_strategy
-from jaxbiped.planning.planners import Planner
 from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.study.arena_kinds import ANY, ArenaKind, kinds_of
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.names import MOVING
+from jaxbiped.study.schema import SCHEMA
 
 
 @dataclass(frozen=True)
@@ -32,13 +37,14 @@ class Point:
     mission: MissionConfig
     population: PopulationConfig
     values: dict[str, float] = field(default_factory=dict)  # dotted field of the config: its value here
-    planner: dict[str, float] = field(default_factory=dict)  # of these, the numbers of planners
+    own: dict[str, float] = field(default_factory=dict)  # of these, the numbers of components: `planner.clearance`
 
 
 @dataclass(frozen=True)
 class Group:
     """Points and strategies that differ in traced numbers alone: `P` points, `S` strategies, one compiled program."""
 
+    kind: ArenaKind
     static: Program
     walk: WalkConfig | None  # of simulated bipeds
     camera: CameraConfig | None  # of sensors that measure on the host
@@ -47,11 +53,16 @@ class Group:
     settings: Settings  # [P * S], strategy by strategy within a point
     populations: Population | None  # [U], those that differ; None: nothing is fixed in any
     population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
+    metrics: tuple[str, ...] = ()  # columns of the metrics of the settings
+
+    def rows(self, shard: Shard) -> int:
+        """How many a shard of this group has."""
+        return self.kind.count(shard.first, shard.count) * len(self.population_of)
 
 
 @dataclass(frozen=True)
 class Shard:
-    """A block of arenas under all points of a group: what one call computes, and one file holds."""
+    """A block of arenas, those of a group's kind, under all its points: what one call computes, and one file holds."""
 
     number: int
     group: int
@@ -91,42 +102,83 @@ def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
     moving = MOVING & set(names)
     if moving and not all(isinstance(item, str) for item in found):
         raise InputError("moves, and goes with families that are built in only", field="families", value=min(moving))
-    area_of(found)
+    return found
+
+
+def metrics_of(config: StudyConfig) -> dict[str, Metric]:
+    """The metrics of a study by their columns, in its order.
+
+    Raises:
+      InputError: a name that is not known, a module that cannot be imported, two of one column, or a column that all
+        rows have.
+    """
+    found: dict[str, Metric] = {}
+    for name in config.metrics:
+        column = column_of(name)
+        if column in found or column in SCHEMA:
+            raise InputError("is a column that rows have already", field="metrics", value=name)
+        found[column] = find_metric(name)
     return found
 
 
 def group_points(
     points: Iterable[Point],
     strategies: Sequence[Strategy | str],
-    area: tuple[float, float] = (SIZE_X, SIZE_Y),
+    kinds: Sequence[ArenaKind] = (ANY,),
+    metrics: Mapping[str, Metric] | None = None,
+    numbers: Mapping[str, float] | None = None,
 ) -> tuple[Group, ...]:
     """Points by what sets array shapes and code paths (`mission.program`), in the order of their first.
 
     Strategies whose planners are of different kinds are groups of their own.
 
     Args:
-      area: [m] of all arenas.
+      kinds: of arenas.
+      metrics: by their columns.
+      numbers: of components, by their dotted names, where a point has none of its own.
 
     Raises:
-      InputError: a point whose grid does not fit the area.
+      InputError: a point whose grid does not fit an area, or whose sensor or executor does not know a terrain.
     """
     strategies = [find_strategy(item) if isinstance(item, str) else item for item in strategies]
-    points = tuple(points)
-    for name in {name for point in points for name in point.planner}:
-        if not any(name in numbers_of(item.planner) for item in strategies):
-            own = sorted({known for item in strategies for known in numbers_of(item.planner)})
-            there = f"they have {', '.join(own)}" if own else "they have none"
-            raise InputError(f"no planner of these strategies has this number; {there}", field=f"axis planner.{name}")
-    together: dict[tuple, list[Point]] = {}
+    points = tuple(replace(point, own={**(numbers or {}), **point.own}) for point in points)
     for point in points:
+        check_numbers(point, strategies)
+    together: dict[tuple, list[Point]] = {}
+    for place, point in itertools.product(range(len(kinds)), points):
         simulated = point.mission.executor in SIMULATED
         walk = point.mission.walk if simulated else None
         camera = point.mission.camera if point.mission.sensor in RENDERED else None
-        together.setdefault((program(point.mission, area), walk, camera), []).append(point)
-    kinds: dict[tuple, list[Strategy]] = {}
+        static = program_for(point.mission, kinds[place].size_xy, kinds[place].terrain)
+        together.setdefault((place, static, walk, camera), []).append(point)
+    by_planner: dict[tuple, list[Strategy]] = {}
     for item in strategies:
-        kinds.setdefault(kind_of(item), []).append(item)
-    return tuple(group(*key, members, kind) for key, members in together.items() for kind in kinds.values())
+        by_planner.setdefault(kind_of(item.planner), []).append(item)
+    return tuple(
+        group(kinds[place], *key, members, same, metrics or {})
+        for (place, *key), members in together.items()
+        for same in by_planner.values()
+    )
+
+
+def check_numbers(point: Point, strategies: Sequence[Strategy]) -> None:
+    """Raise `InputError` about a number of a point that no component of its missions has."""
+    mission = point.mission
+    there = {
+        "planner": sorted({name for item in strategies for name in numbers_of(item.planner)}),
+        "sensor": list(numbers_of(find_sensor(mission.sensor))),
+        "executor": list(numbers_of(find_executor(mission.executor))),
+    }
+    for dotted in point.own:
+        kind, _, name = dotted.partition(".")
+        if name not in there.get(kind, ()):
+            known = f"has {', '.join(there[kind])}" if there.get(kind) else "has none"
+            raise InputError(f"no {kind} of these missions has this number; {kind} {known}", field=f"axis {dotted}")
+
+
+def numbers_under(kind: str, numbers: Mapping[str, float]) -> dict[str, float]:
+    """Those of a kind of component, by their own names."""
+    return {name.removeprefix(f"{kind}."): value for name, value in numbers.items() if name.startswith(f"{kind}.")}
 
 
 def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tuple[Group, ...]:
@@ -135,49 +187,35 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
     Raises:
       InputError: strategies, families or points that do not go together.
     """
-    return group_points(points or only_point(config), strategies_of(config), area_of(families_of(config)))
-
-
-def numbers_of(planner: Planner | None) -> tuple[str, ...]:
-    """The fields of a planner that a sweep may change: those that hold one number each."""
-    if planner is None or not is_dataclass(planner):
-        return ()
-    names = [f.name for f in fields(planner) if not (f.metadata.get("static") or f.metadata.get("derived"))]
-    values = {name: np.asarray(getattr(planner, name)) for name in names}
-    return tuple(name for name, value in values.items() if value.ndim == 0 and value.dtype.kind in "iuf")
-
-
-def with_numbers(planner: Planner | None, numbers: Mapping[str, float]) -> Planner | None:
-    """The planner with those of the numbers that it has."""
-    known = {name: float(numbers[name]) for name in numbers_of(planner) if name in numbers}
-    return replace(planner, **known) if known else planner
-
-
-def kind_of(strategy: Strategy) -> tuple:
-    """What decides the program of a strategy: the structure of its planner, and the shapes of its numbers."""
-    leaves, structure = jax.tree.flatten(strategy.planner)
-    return structure, *((np.shape(leaf), np.asarray(leaf).dtype.kind) for leaf in leaves)
+    kinds = kinds_of(families_of(config))
+    return group_points(points or only_point(config), strategies_of(config), kinds, metrics_of(config), config.numbers)
 
 
 def group(
+    kind: ArenaKind,
     static: Program,
     walk: WalkConfig | None,
     camera: CameraConfig | None,
     points: Sequence[Point],
     strategies: Sequence[Strategy],
+    metrics: Mapping[str, Metric],
 ) -> Group:
     """The points of one program."""
-    settings = []
+    settings, measured = [], tuple(traced_component(metric) for metric in metrics.values())
     for point in points:
         first = point.mission.settings(strategies[0])
+        for name in ("sensor", "executor"):
+            component = with_numbers(getattr(first, name), numbers_under(name, point.own))
+            first = replace(first, **{name: traced_component(component)})
         cutting = point.mission.corner_cutting
         for item in strategies:
-            own = with_numbers(item.planner, point.planner)
-            planner = first.planner if own is None else traced_planner(own)
-            settings.append(replace(first, strategy=item.flags(cutting), planner=planner))
+            own = with_numbers(item.planner, numbers_under("planner", point.own))
+            planner = first.planner if own is None else traced_component(own)
+            settings.append(replace(first, strategy=item.flags(cutting), planner=planner, metrics=measured))
     different = list(dict.fromkeys(point.population for point in points))
     drawn = different == [PopulationConfig()]
     return Group(
+        kind=kind,
         static=static,
         walk=walk,
         camera=camera,
@@ -186,6 +224,7 @@ def group(
         settings=stack(settings),
         populations=None if drawn else stack([population.traced() for population in different]),
         population_of=np.repeat([different.index(point.population) for point in points], len(strategies)),
+        metrics=tuple(metrics),
     )
 
 

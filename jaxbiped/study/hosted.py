@@ -15,6 +15,7 @@ from jaxtyping import Array, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.eyes import Eyes, StereoEyes
+from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import OnProgress, Result, Tally, ending, no_results
 from jaxbiped.mission.settings import Program, Settings
@@ -44,7 +45,9 @@ def run_on_host(
       workers: one for each core that there is; OpenGL and OpenCV have threads of their own beside.
     """
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
-    out, left = no_results(kinds, count), np.ndindex(count, kinds)
+    first = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (batch, points))
+    metrics = jax.eval_shape(lambda arena, settings: begun(settings.metrics, arena, settings), *first)
+    out, left = no_results(kinds, count, metrics=metrics), np.ndindex(count, kinds)
     done, lock, stop = Tally(0, 0), threading.Lock(), threading.Event()
 
     def play(_: int) -> None:

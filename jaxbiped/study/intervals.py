@@ -101,6 +101,25 @@ def mean_and_median(
     )
 
 
+def mean_estimate(
+    samples: Float[np.ndarray, "n"], *, seed: int, resamples: int = 4999, level: float = 0.95
+) -> Estimate:
+    """The mean alone, as `mean_and_median` has it but for its resamples; a fifth of the time."""
+    n = len(samples)
+    if n == 0:
+        return NOTHING
+    value = float(np.mean(samples))
+    if n < 3 or np.ptp(samples) == 0:
+        return Estimate(value, n=n)
+    if n > BOOTSTRAP_LIMIT:
+        low, high = stats.t.interval(level, n - 1, loc=value, scale=stats.sem(samples))
+    else:
+        batch, rng = max(1, 2_000_000 // n), np.random.default_rng(seed)
+        options = {"n_resamples": resamples, "confidence_level": level, "method": "BCa", "batch": batch, "rng": rng}
+        low, high = stats.bootstrap((samples,), np.mean, **options).confidence_interval
+    return Estimate(value, float(low), float(high), n=n)
+
+
 def bootstrap(samples: Float[np.ndarray, "n"], seed: int, resamples: int, level: float) -> Float[np.ndarray, "2 2"]:
     """Limits (low, high) of the mean and of the median by BCa."""
     with warnings.catch_warnings():

@@ -10,4 +10,5 @@ FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")  # of a s
 MOVING = frozenset({"traffic"})
 KNOWN = (*FAMILIES, *MOVING)
 SCENE = "scene"  # the family of an arena that was written by hand
+METRICS = ("spl", "clearance", "replans", "measuring")  # of a study that names none
 MEASURES = ("success", "distance", "time")  # whose differences strategies are compared by

@@ -9,25 +9,18 @@ from functools import partial
 from jaxtyping import Array, UInt32
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.ground import WITH_TERRAIN, refuse_terrain
 from jaxbiped.mission.eyes import Eyes, eyes_for
+from jaxbiped.mission.program_for import program_for
 from jaxbiped.mission.queue import Result
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, program
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program
 from jaxbiped.mission.stepped import Mission, Played, run_logged
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.study.groups import Group
 
 
-def program_for(config: MissionConfig, arena: Arena) -> Program:
-    """The static part of missions in an arena of this size, with this terrain.
-
-    Raises:
-      InputError: a pitch that does not divide it; terrain that the sensor or the executor does not know.
-    """
-    for kind, choice in (("sensor", config.sensor), ("executor", config.executor)):
-        if choice not in WITH_TERRAIN[kind]:
-            refuse_terrain(arena, f"{kind} {choice}")
-    return program(config, tuple(round(float(side), 6) for side in arena.size_xy), arena.terrain)
+def program_of(config: MissionConfig, arena: Arena) -> Program:
+    """The static part of missions in one arena; see `mission.program_for`."""
+    return program_for(config, tuple(round(float(side), 6) for side in arena.size_xy), arena.terrain)
 
 
 def check_mission(config: MissionConfig) -> None:
@@ -70,7 +63,7 @@ def play_one(
     Raises:
       InputError: a pitch that does not divide the arena, a biped that cannot be simulated.
     """
-    arguments = arena, config.settings(strategy), noise, program_for(config, arena)
+    arguments = arena, config.settings(strategy), noise, program_of(config, arena)
     if config.executor in SIMULATED:
         from jaxbiped.mission.walking import walk_logged  # loads MuJoCo
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import polars as pl
@@ -45,6 +46,7 @@ SCHEMA = pl.Schema(
         "plan_cost": pl.Float64,  # of the first way that was found, by Eq. 1; null where that is not known
     }
 )
+METRIC_NAME = r"^[a-z][a-z0-9_]{0,39}$"  # columns of metrics, which follow those of the schema: Float64, or null
 ADDED = ("planning_calls", "planning_time", "plan_cost")  # null in rows that older versions wrote
 NULLABLE = ("distance", "time", "oracle_cost", "oracle_length", *ADDED)
 
@@ -62,7 +64,7 @@ def ordered(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
-    """The frame with its columns in the schema's order; `InputError` about the first thing wrong with it.
+    """The frame with its columns in the schema's order, then those of metrics; `InputError` about what is wrong first.
 
     Checked: columns and types, the named values, nulls (a number that is not valid is null, never NaN), that
     distance and time are there exactly for those that reached, and that no row comes twice. NaN is allowed only in
@@ -75,10 +77,12 @@ def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
             raise InputError(f"column missing; rows have {', '.join(SCHEMA)}", field=name, **where)
         if frame.schema[name] != dtype:
             raise InputError(f"must be of type {dtype}", field=name, value=str(frame.schema[name]), **where)
+    measured = metric_columns(frame)
     for name in frame.columns:
-        if name not in SCHEMA:
-            raise InputError(f"unknown column; rows have {', '.join(SCHEMA)}", field=name, **where)
-    for name, (wrong, allowed) in rules().items():
+        if name not in SCHEMA and not (re.fullmatch(METRIC_NAME, name) and frame.schema[name] == pl.Float64):
+            message = f"unknown column; rows have {', '.join(SCHEMA)}, and metrics: small letters, of type Float64"
+            raise InputError(message, field=name, **where)
+    for name, (wrong, allowed) in (rules() | metric_rules(measured)).items():
         bad = frame.filter(wrong)
         if len(bad):
             row = bad.row(0, named=True)
@@ -87,7 +91,17 @@ def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
     doubled = frame.filter(pl.struct(KEY).is_duplicated())
     if len(doubled):
         raise InputError("each sweep point, arena and strategy has one row", value=doubled.select(KEY).row(0), **where)
-    return frame.select(SCHEMA.names())
+    return frame.select(*SCHEMA.names(), *measured)
+
+
+def metric_columns(frame: pl.DataFrame) -> tuple[str, ...]:
+    """The columns of metrics."""
+    return tuple(name for name in frame.columns if name not in SCHEMA)
+
+
+def metric_rules(names: Iterable[str]) -> dict[str, tuple[pl.Expr, str]]:
+    """As `rules`, of metrics."""
+    return {name: (pl.col(name).is_not_null() & ~pl.col(name).is_finite(), "must be finite or null") for name in names}
 
 
 def rules() -> dict[str, tuple[pl.Expr, str]]:

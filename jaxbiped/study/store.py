@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import time
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,7 +25,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
-from jaxbiped.study.schema import ADDED, SCHEMA, ordered, validate
+from jaxbiped.study.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
 from jaxbiped.terminal import command_line
 
 POINTS, ROWS = "points.parquet", "rows"
@@ -218,7 +219,7 @@ def read(folder: str | Path) -> StoredRows:
         except UNREADABLE as error:
             raise broken_shard(path, error) from None
     check_complete(folder, manifest, sum(len(frame) for frame in frames))
-    frame = pl.concat(frames) if frames else pl.DataFrame(schema=SCHEMA)
+    frame = pl.concat(frames, how="diagonal") if frames else pl.DataFrame(schema=SCHEMA)
     strategy = pl.col("strategy").cast(pl.Enum(ordered(frame["strategy"].unique())))
     return StoredRows(validate(frame, file=folder).sort("point", "arena", strategy), manifest)
 
@@ -228,17 +229,23 @@ def scan(folder: str | Path) -> pl.LazyFrame:
 
     Only the shards' footers are read and checked here.
     """
-    paths = shard_paths(folder)
+    paths, wanted = shard_paths(folder), dict(SCHEMA)
     for path in paths:
         try:
-            schema = pl.read_parquet_schema(path)
+            schema = dict(pl.read_parquet_schema(path))
         except UNREADABLE as error:
             raise broken_shard(path, error) from None
-        if {name: SCHEMA[name] for name in ADDED} | dict(schema) != dict(SCHEMA):
-            raise InputError(f"is not a shard of this format; its columns must be {', '.join(SCHEMA)}", file=path)
+        measured = {name: kind for name, kind in schema.items() if name not in SCHEMA}
+        own = {name: kind for name, kind in schema.items() if name in SCHEMA}
+        if {name: SCHEMA[name] for name in ADDED} | own != dict(SCHEMA) or not all(
+            re.fullmatch(METRIC_NAME, name) and kind == pl.Float64 for name, kind in measured.items()
+        ):
+            message = f"is not a shard of this format; its columns must be {', '.join(SCHEMA)}, and those of metrics"
+            raise InputError(message, file=path)
+        wanted |= measured
     if not paths:
         return pl.LazyFrame(schema=SCHEMA)
-    return pl.scan_parquet(paths, schema=dict(SCHEMA), missing_columns="insert")
+    return pl.scan_parquet(paths, schema=wanted, missing_columns="insert")
 
 
 def read_points(folder: str | Path) -> pl.DataFrame:

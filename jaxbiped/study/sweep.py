@@ -16,12 +16,12 @@ from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.mission.config import MissionConfig
 from jaxbiped.study.axes import Axis, Sobol, told
-from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.config import OF_COMPONENTS, StudyConfig
 
 if TYPE_CHECKING:
     from jaxbiped.study.groups import Point
 
-POPULATION, PLANNER = "population", "planner"
+POPULATION = "population"
 OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # numbers that may be left out
 EXAMPLES = "costs.c3, pitch, stereo.sd, robot.radius or population.bump_width"
 
@@ -77,8 +77,8 @@ class SweepConfig(StudyConfig):
         for name in fields:
             if fields.count(name) > 1:
                 raise InputError("is swept twice; a field can be in one axis", field=f"axis {name}")
-            if name.startswith(f"{PLANNER}."):
-                check_planner_field(name)
+            if name.startswith(OF_COMPONENTS):
+                check_component_field(name)
                 continue
             check_field(name, mission | {POPULATION: population})
             family = FAMILY_OF.get(name.removeprefix(f"{POPULATION}."))
@@ -87,8 +87,8 @@ class SweepConfig(StudyConfig):
         own = []
         if self.base:
             for name in fields:
-                if name.startswith(f"{PLANNER}."):
-                    raise InputError("a planner's number has no value in the config for the base point", field=name)
+                if name.startswith(OF_COMPONENTS):
+                    raise InputError("a component's number has no value in the config for the base point", field=name)
             leaves = dict(flat(mission | {POPULATION: population}))
             own = [{name: leaves[name] for name in fields}]
             for name in fields:
@@ -115,10 +115,10 @@ def point_at(index: int, values: dict[str, float], mission: dict[str, Any], popu
     from jaxbiped.mission.settings import program
     from jaxbiped.study.groups import Point
 
-    of_planner = {}
+    own = {}
     for name, value in values.items():
-        if name.startswith(f"{PLANNER}."):
-            of_planner[name.removeprefix(f"{PLANNER}.")] = value
+        if name.startswith(OF_COMPONENTS):
+            own[name] = value
         elif name.startswith(f"{POPULATION}."):
             population = replaced(population, name.split(".")[1:], value)
         else:
@@ -129,7 +129,7 @@ def point_at(index: int, values: dict[str, float], mission: dict[str, Any], popu
     except InputError as error:
         raise InputError(f"{shown(values)}: {error}", field="axes") from None
     drawn = validated(PopulationConfig, population, values, f"{POPULATION}.")
-    return Point(index, kind, drawn, values, of_planner)
+    return Point(index, kind, drawn, values, own)
 
 
 def validated(model: type[Model], data: dict[str, Any], values: Mapping[str, float], prefix: str = ""):
@@ -155,10 +155,11 @@ def replaced(tree: dict[str, Any], path: list[str], value: float) -> dict[str, A
     return tree | {name: replaced(tree[name], rest, value) if rest else value}
 
 
-def check_planner_field(name: str) -> None:
-    """Raise `InputError` unless a dotted name may be that of a planner's number; whether there is one shows later."""
-    if not name.removeprefix(f"{PLANNER}.").isidentifier():
-        raise InputError("must be planner.<field>", field=f"axis {name}")
+def check_component_field(name: str) -> None:
+    """Raise `InputError` unless a dotted name may be that of a component's number; whether there is one shows later."""
+    kind, _, field = name.partition(".")
+    if not field.isidentifier():
+        raise InputError(f"must be {kind}.<field>", field=f"axis {name}")
 
 
 def check_field(name: str, config: Mapping[str, Any]) -> None:

@@ -1,8 +1,10 @@
 """The names that `import jaxbiped` gives, and what little it loads."""
 
+import ast
 import itertools
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ import jaxbiped as jb
 
 
 def test_every_name_can_be_used_and_is_documented():
-    assert 30 <= len(jb.__all__) <= 50 and set(jb.__all__) <= set(dir(jb))
+    assert 30 <= len(jb.__all__) <= 64 and set(jb.__all__) <= set(dir(jb))
     for name in jb.__all__:
         value = getattr(jb, name)
         assert name == "DIRECTIONS" or value.__doc__
@@ -88,3 +90,15 @@ def test_names_are_registered_once():
 def test_names_that_cannot_be_shown_are_refused(name):
     with pytest.raises(jb.InputError, match="name of a strategy"):
         jb.Strategy(name)
+
+
+def test_type_checkers_see_the_same_names():
+    """The stub beside the package, name by name and place by place."""
+    origins = vars(jb)["origins_"]
+    seen = {}
+    for node in ast.parse(Path(jb.__file__).with_suffix(".pyi").read_text()).body:
+        if isinstance(node, ast.ImportFrom):
+            seen |= {alias.asname: (node.module.removeprefix("jaxbiped."), alias.name) for alias in node.names}
+        if isinstance(node, ast.Assign):  # of what is called otherwise where it comes from
+            seen[node.targets[0].id] = seen.pop(node.value.id)
+    assert seen == origins and Path(jb.__file__).with_name("py.typed").exists()

@@ -4,6 +4,7 @@ import polars as pl
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.study.names import METRICS
 from jaxbiped.study.schema import SCHEMA
 from tests.api.conftest import gives_up, plain_dijkstra
 
@@ -13,7 +14,7 @@ def of(results, name):
 
 
 def test_every_strategy_has_a_row_for_every_arena_under_its_own_name(results):
-    assert results.rows.columns == SCHEMA.names() and len(results.rows) == 9 * 12
+    assert results.rows.columns == [*SCHEMA.names(), *METRICS] and len(results.rows) == 9 * 12
     assert results.strategies[0] == "full" and set(results.strategies[1:]) == {
         *("plain_dijkstra", "raises", "through_walls", "gives_up", "slow", "on floor", "priceless", "Clearance")
     }
@@ -66,7 +67,7 @@ def test_comparisons_show_themselves(results):
             results.compare(first, second)
 
 
-@pytest.mark.parametrize("metric", ["success", "distance", "time"])
+@pytest.mark.parametrize("metric", ["success", "distance", "time", "spl", "clearance"])
 def test_own_metrics_are_drawn_side_by_side(results, metric):
     figure = results.plot(metric)
     labels = [text.get_text() for text in figure.axes[0].get_xticklabels()]
@@ -74,7 +75,7 @@ def test_own_metrics_are_drawn_side_by_side(results, metric):
 
 
 def test_a_metric_that_is_not_known_is_named(results):
-    with pytest.raises(jb.InputError, match="must be one of success, distance, time"):
+    with pytest.raises(jb.InputError, match="must be one of success, distance, time, spl, clearance"):
         results.plot("beauty")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas import families as built_in
-from jaxbiped.arenas.source import Family, area_of, draw_arena, find_family, name_of, scene_family
+from jaxbiped.arenas.source import Family, draw_arena, find_family, name_of, scene_family, size_of, terrain_of
 from jaxbiped.errors import InputError
 
 SCENES = Path(__file__).parents[2] / "configs" / "scenes"
@@ -66,7 +66,7 @@ def test_more_boxes_than_any_other_family_has():
 def test_scenes_are_families_with_one_arena():
     paths = sorted(SCENES.glob("experiment_*.toml"))
     scenes = tuple(map(scene_family, paths))
-    assert [name_of(item) for item in scenes] == [path.stem for path in paths] and area_of(scenes) == (1.8, 1.4)
+    assert [name_of(item) for item in scenes] == [path.stem for path in paths]
     arenas = drawn(scenes)
     for k in range(9):
         np.testing.assert_array_equal(arenas.goal_xy[k], scenes[k % len(paths)].scene.goal_xy)
@@ -101,11 +101,16 @@ def test_generators_that_return_something_else_are_named(generator, match):
         drawn((Family("lab", generator),))
 
 
-def test_sizes_that_differ_are_named():
+def test_sizes_of_families():
     wide = Family("wide", wrong(size_xy=jnp.array([3.0, 1.4])))
-    assert area_of((wide,)) == (3.0, 1.4)
-    with pytest.raises(InputError, match=r"wide is 3 x 1.4 m, bump 1.8 x 1.4 m"):
-        area_of(("bump", wide))
+    assert size_of(wide) == (3.0, 1.4) and size_of("bump") == (1.8, 1.4)
+    stairs = scene_family(SCENES.parent / "terrain" / "stairs.toml")
+    assert (
+        stairs.name == "scene stairs"
+        and terrain_of(stairs) is not None
+        and terrain_of(wide) is None
+        and terrain_of("bump") is None
+    )
 
 
 def test_names_that_are_not_known_are_refused(tmp_path):

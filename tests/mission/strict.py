@@ -11,9 +11,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped.core.registry import EXECUTORS
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose, to_world
-from jaxbiped.mission.executors import EXECUTORS, kinematic
+from jaxbiped.mission.execution import Executor
+from jaxbiped.mission.executors import kinematic
 from jaxbiped.motion.primitives import Primitive
 
 FINE = np.arange(-0.06, 0.2401, 0.001, dtype=np.float32)  # [m] ahead of the robot, where edges are looked for
@@ -77,4 +79,15 @@ def strict(arena, world, command, settings):
     return replace(done, pose=pose, fell=bad & ~done.collided)
 
 
-EXECUTORS["strict"] = strict
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Strict(Executor):
+    """See `strict`."""
+
+    places_feet = True
+
+    def execute(self, arena, world, command, settings):
+        return strict(arena, world, command, settings)
+
+
+EXECUTORS.add("strict", Strict())

@@ -13,7 +13,7 @@ from jaxbiped.sensing.presets import PRESETS
 def test_what_is_declared_is_a_field_and_a_choice(choice):
     known = MissionConfig().model_dump()
     for value, fields in BY_CHOICE[choice].items():
-        mission = MissionConfig(**{choice: value})
+        mission = MissionConfig(**{choice: value or "package.module:name"})
         for field, default in fields.items():
             part, name = field.split(".")
             assert name in known[part] and getattr(getattr(mission, part), name) == default

@@ -11,6 +11,7 @@ import pytest
 import tests.mission.strict  # noqa: F401  (the executor)
 from jaxbiped.arenas import load_scene
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.config import EXECUTORS
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig, program
@@ -18,7 +19,7 @@ from jaxbiped.mission.state import start
 from jaxbiped.mission.stepped import turn_once
 from jaxbiped.study.evaluate import draw
 from tests.mission.conftest import CONFIG, PROGRAM, row
-from tests.mission.strict import footfall
+from tests.mission.strict import Strict, footfall
 
 SCENES = [Path(__file__).parents[2] / "configs" / "scenes" / f"experiment_{k}.toml" for k in (3, 5)]
 FAMILIES = ("bump", "stairs", "mixed")
@@ -33,7 +34,7 @@ def walked():
     arenas, seeds = jax.device_get(draw(jax.random.key(11), jnp.arange(ARENAS), FAMILIES))
     rows = [row(arenas, k) for k in range(ARENAS)] + [jax.device_get(load_scene(path)[1]) for path in SCENES]
     batch = jax.tree.map(jnp.asarray, stack(rows))
-    setting = CONFIG.settings("full")
+    setting = replace(CONFIG.settings("full"), executor=Strict())
     settings = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (len(rows), *leaf.shape)), setting)
     seeds = jnp.asarray([*seeds, 7, 8], jnp.uint32)
     world, mind = jax.jit(jax.vmap(start, in_axes=(0, 0, 0, None)), static_argnums=3)(
@@ -72,6 +73,6 @@ def test_missions_succeed_before_a_strict_referee(walked):
 
 def test_feet_are_placed_where_they_count():
     assert not PROGRAM.footing
-    for name in MissionConfig.model_fields["executor"].annotation.__args__:
+    for name in EXECUTORS:
         config = MissionConfig(executor=name)
         assert program(config, (1.8, 1.4)).footing == (name != "kinematic")

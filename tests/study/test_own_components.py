@@ -11,6 +11,7 @@ import pytest
 
 from jaxbiped.api.results import Results
 from jaxbiped.arenas.source import Family, scene_family
+from jaxbiped.core.component import numbers_of, with_numbers
 from jaxbiped.core.registry import FAMILIES, STRATEGIES, Registry
 from jaxbiped.errors import InputError
 from jaxbiped.mission.strategies import Strategy
@@ -19,7 +20,7 @@ from jaxbiped.planning.host_planner import HostPlanner
 from jaxbiped.planning.planners import GridPlanner, Route, StraightLine, check_route
 from jaxbiped.study.conduct import conduct, in_order, shard_rows
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import families_of, group_points, numbers_of, only_point, shards, with_numbers
+from jaxbiped.study.groups import families_of, group_points, only_point, shards
 from jaxbiped.study.store import read_points
 from tests.study.synthetic import rows
 

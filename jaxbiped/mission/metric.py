@@ -1,0 +1,150 @@
+"""Metrics: numbers that each mission has beside its code, and what one is; those that people bring are like these."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from jaxbiped.core.component import check_component
+from jaxbiped.core.registry import METRICS
+from jaxbiped.errors import InputError
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")  # a column's
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Step:
+    """One decision of one mission, after it was played."""
+
+    arena: Any  # `Arena`
+    before: Any  # `World` when the robot decided
+    after: Any  # `World` after what it did
+    command: Any  # `Command` that it gave
+    played: Bool[Array, "*B"]  # False: the mission ended with this decision, and the robot stayed
+    settings: Any  # `Settings` of the mission
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class MissionEnd:
+    """One mission that has ended."""
+
+    arena: Any  # `Arena`
+    result: Any  # `Result`: its code, distance, time and so on
+    plan: Any  # `OraclePlan`: whether a plan exists with perfect knowledge, its cost and its length
+    settings: Any  # `Settings`
+
+
+class Metric:
+    """The base of metrics: a frozen dataclass that is a pytree, as planners are.
+
+    It is written for one mission. What it must remember on the way is a pytree of arrays, by default nothing.
+    """
+
+    unit: ClassVar[str] = ""  # that people are shown it in
+    scale: ClassVar[float] = 1.0  # from SI to that unit
+    digits: ClassVar[int] = 2  # after the point
+    smaller_is_better: ClassVar[bool] = True
+
+    def start(self, arena: Any, settings: Any) -> Any:
+        """What it remembers before the first decision in an `Arena`."""
+        return ()
+
+    def update(self, state: Any, step: Step) -> Any:
+        """The same after a decision: of the same shapes and types."""
+        return state
+
+    def result(self, state: Any, end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
+        """The number, and whether there is one: for "fell on the way" there may be none."""
+        raise NotImplementedError(f"{type(self).__name__} has no method `result`")
+
+
+def check_metric(metric: object, name: str) -> None:
+    """Raise `InputError` unless an object can be a metric of this name inside a compiled program."""
+    if not NAME.fullmatch(name):
+        message = "must begin with a small letter and have at most 40 small letters, digits and _"
+        raise InputError(message, field="name of a metric", value=name)
+    check_component(metric, Metric, f"metric {name}")
+
+
+def as_metric(thing: object, name: str) -> Metric:
+    """A metric of something that stands for one: a metric or its class.
+
+    Raises:
+      InputError: anything else, or a name that no column can have.
+    """
+    if isinstance(thing, type) and issubclass(thing, Metric):
+        thing = thing()
+    check_metric(thing, name)
+    return thing
+
+
+def find_metric(name: str) -> Metric:
+    """The metric of a name in the registry, or of `package.module:name`, which is imported.
+
+    Raises:
+      InputError: a name that is not known, with those that are; a module that cannot be imported.
+    """
+    from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
+
+    return METRICS.find(name, lambda thing, own: as_metric(thing, column_of(f":{own}")))
+
+
+def column_of(name: str) -> str:
+    """The column of a metric in rows: its name, without the module that it comes from; `slow_walk` of `SlowWalk`."""
+    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.rpartition(":")[2]).lower() if ":" in name else name
+
+
+def begun(metrics: tuple[Metric, ...], arena: Any, settings: Any) -> tuple:
+    """What each metric remembers at the start of one mission."""
+    return tuple(jax.tree.map(jnp.asarray, metric.start(arena, settings)) for metric in metrics)
+
+
+def updated(metrics: tuple[Metric, ...], states: tuple, step: Step) -> tuple:
+    """The same after a decision.
+
+    Raises:
+      InputError: a metric whose memory changes its shapes or types.
+    """
+    found = []
+    for metric, state in zip(metrics, states, strict=True):
+        new = metric.update(state, step)
+        kinds = [jax.tree.map(lambda leaf: (jnp.shape(leaf), jnp.result_type(leaf)), tree) for tree in (state, new)]
+        if kinds[0] != kinds[1]:
+            message = f"its update returned {described(new)} where its start gave {described(state)}"
+            raise InputError(message, field=f"metric {type(metric).__name__}")
+        found.append(new)
+    return tuple(found)
+
+
+def described(tree: Any) -> str:
+    """Types and shapes of a pytree, for a message."""
+    leaves = jax.tree.leaves(tree)
+    return ", ".join(f"{jnp.result_type(leaf)}{list(jnp.shape(leaf))}" for leaf in leaves) or "nothing"
+
+
+def numbers_at_end(metrics: tuple[Metric, ...], states: tuple, end: MissionEnd) -> tuple:
+    """(value, valid) of each metric for one mission.
+
+    Raises:
+      InputError: a result that is not one number and one truth value.
+    """
+    found = []
+    for metric, state in zip(metrics, states, strict=True):
+        made = metric.result(state, end)
+        name = f"metric {type(metric).__name__}"
+        if not isinstance(made, tuple) or len(made) != 2:
+            raise InputError("its result must be (value, valid)", field=name, value=type(made).__name__)
+        for part, kinds in zip(made, ("fiu", "b"), strict=True):
+            if jnp.shape(part) != () or np.dtype(jnp.result_type(part)).kind not in kinds:
+                message = f"its result is {described(made)} where one number and one truth value are wanted"
+                raise InputError(message, field=name)
+        found.append((jnp.asarray(made[0], jnp.float32), jnp.asarray(made[1])))
+    return tuple(found)

@@ -1,0 +1,104 @@
+"""The metrics that are built in, beside success, distance and time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from jaxbiped.core.registry import METRICS
+from jaxbiped.geometry.boxes import plan_distance
+from jaxbiped.mission.execution import CHECKS, TOUCH
+from jaxbiped.mission.metric import Metric, MissionEnd, Step
+from jaxbiped.mission.outcome import Code
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class PathEfficiency(Metric):
+    """Success weighted by path length (SPL): the oracle plan's length by that walked, at most 1; 0 for a failure.
+
+    Anderson et al., "On Evaluation of Embodied Navigation Agents" (2018). Deviation: the shortest path is the plan of
+    least cost with perfect knowledge, for the same strategy. There is none where a robot arrived without such a plan.
+    """
+
+    digits = 3
+    smaller_is_better = False
+
+    def result(self, state: tuple, end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
+        """See `Metric`."""
+        shortest, walked = end.plan.length, end.result.distance
+        reached = end.result.code == Code.REACHED
+        value = shortest / jnp.maximum(jnp.maximum(walked, shortest), 1e-6)
+        return jnp.where(reached, value, 0.0), ~reached | (end.plan.reachable & jnp.isfinite(shortest))
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class LeastClearance(Metric):
+    """[m] how near the body came to a box that stood between its raised foot and its head; below 0 where they met.
+
+    Boxes are looked at where they stand at the moment, at a third, two thirds and the end of each step, as the referee
+    does. Terrain does not count. There is none where no such box was.
+    """
+
+    unit, scale, digits = "cm", 100.0, 1
+    smaller_is_better = False
+
+    def start(self, arena, settings) -> Float[Array, ""]:
+        """See `Metric`."""
+        return jnp.full((), jnp.inf)
+
+    def update(self, state: Float[Array, ""], step: Step) -> Float[Array, ""]:
+        """See `Metric`."""
+        boxes, before, after, settings = step.arena.boxes, step.before.pose, step.after.pose, step.settings
+        head = jnp.where(step.command.squat, settings.body.squatting, settings.body.standing)
+        foot = jnp.maximum(before.z, after.z)
+        there = (boxes.top > foot + settings.body.step + TOUCH) & (boxes.bottom < foot + head - TOUCH) & boxes.used
+        for part in CHECKS:
+            x, y = (start + part * (end - start) for start, end in ((before.x, after.x), (before.y, after.y)))
+            gap = jnp.min(jnp.where(there, plan_distance(boxes, x, y), jnp.inf), initial=jnp.inf)
+            state = jnp.where(step.played, jnp.minimum(state, gap - settings.limits.body_radius), state)
+        return state
+
+    def result(self, state: Float[Array, ""], end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
+        """See `Metric`."""
+        return state, jnp.isfinite(state)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Replans(Metric):
+    """How often a plan was made anew: plans but the first. There is none where none was made."""
+
+    digits = 1
+
+    def result(self, state: tuple, end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
+        """See `Metric`."""
+        calls = end.result.planned.calls
+        return jnp.asarray(calls - 1, jnp.float32), calls > 0
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class MeasuringShare(Metric):
+    """Share of a mission's time that was spent measuring."""
+
+    unit, scale, digits = "%", 100.0, 1
+
+    def result(self, state: tuple, end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
+        """See `Metric`."""
+        spent = end.result.measurements * end.settings.durations.measure
+        some = end.result.time > 0
+        return spent / jnp.where(some, end.result.time, 1.0), some
+
+
+for _name, _metric in (
+    ("spl", PathEfficiency()),
+    ("clearance", LeastClearance()),
+    ("replans", Replans()),
+    ("measuring", MeasuringShare()),
+):
+    METRICS.add(_name, _metric)

@@ -1,0 +1,130 @@
+"""Sensors that measure inside the compiled loop: those that are built in, and the base of those that people bring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, UInt32
+
+from jaxbiped.core.component import check_component
+from jaxbiped.core.registry import SENSORS
+from jaxbiped.errors import InputError
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.config import RENDERED
+from jaxbiped.sensing import oracle, raycast
+from jaxbiped.sensing.view import View
+
+ORACLE_SPACING = (
+    0.02  # [m] of the columns of the oracle's points, or a cell's pitch if that is less; thinner walls slip through
+)
+ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid by itself
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Standpoint:
+    """From where, and how, one robot measures."""
+
+    pose: Pose  # the true one; z is the height of the ground under the robot
+    looks_down: Bool[Array, "*B"]  # its camera is tilted to the feet
+    squat: Bool[Array, "*B"]
+    attitude: tuple[Float[Array, "*B"], Float[Array, "*B"]] | None  # [rad] true roll and pitch; None: not known
+    seed: UInt32[Array, "*B"]  # of this measurement's noise
+
+
+class Sensor:
+    """The base of sensors: a frozen dataclass that is a pytree, as planners are. It is written for one robot."""
+
+    knows_pose: ClassVar[bool] = False  # the robot knows where it stands, and its points are level
+    on_terrain: ClassVar[bool] = False  # it knows arenas with terrain
+
+    def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+        """Points in the robot frame of one `Arena`.
+
+        Args:
+          settings: `settings.camera`, `settings.stereo` and so on, traced.
+          program: what is static: `program.image` (the camera's rays), `program.spec` (the grid).
+
+        Numbers that are not finite end the mission as `invalid`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has no method `measure`")
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class RayCast(Sensor):
+    """True depth, as a stereo matcher would measure it; see `sensing.raycast`."""
+
+    on_terrain = True
+
+    def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+        """See `Sensor`."""
+        camera, stereo = settings.camera, settings.stereo
+        return raycast.measure(
+            arena, at.pose, camera, stereo, program.image, at.seed, at.looks_down, at.squat, at.attitude
+        )
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Oracle(Sensor):
+    """The true arena, all of it, and the true pose; see `sensing.oracle`."""
+
+    knows_pose, on_terrain = True, True
+
+    def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+        """See `Sensor`."""
+        area = (program.spec.size_x, program.spec.size_y)
+        spacing, levels = min(ORACLE_SPACING, program.spec.pitch), program.spec.levels + program.spec.lowest
+        return oracle.measure(arena, at.pose, area, spacing=spacing, levels=levels, weight=ORACLE_WEIGHT)
+
+
+BUILT_IN = {"raycast": RayCast(), "oracle": Oracle()}
+for _name, _sensor in BUILT_IN.items():
+    SENSORS.add(_name, _sensor)
+
+
+def as_sensor(thing: object, name: str) -> Sensor:
+    """A sensor of something that stands for one: a sensor or its class.
+
+    Raises:
+      InputError: anything else.
+    """
+    if isinstance(thing, type) and issubclass(thing, Sensor):
+        thing = thing()
+    check_component(thing, Sensor, f"sensor {name}")
+    return thing
+
+
+def find_sensor(name: str) -> Sensor | None:
+    """The sensor of a name in the registry, or of `package.module:name`, which is imported; None: on the host.
+
+    Raises:
+      InputError: a name that is not known, with those that are; a module that cannot be imported.
+    """
+    return None if name in RENDERED else SENSORS.find(name, as_sensor)
+
+
+def view_of(sensor: Sensor, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+    """What a sensor measures, checked where it is not built in; what is not finite is all in the weights then, as NaN.
+
+    Raises:
+      InputError: something that is no view of one robot.
+    """
+    view = sensor.measure(arena, at, settings, program)
+    if type(sensor) in (RayCast, Oracle):
+        return view
+    where = f"sensor {type(sensor).__name__}"
+    if not isinstance(view, View):
+        raise InputError("its measure must return a View", field=where, value=type(view).__name__)
+    shapes = [jnp.shape(leaf) for leaf in jax.tree.leaves(view)]
+    if len(set(shapes)) != 1 or len(shapes[0]) != 1 or shapes[0][0] == 0:
+        said = ", ".join(str(list(shape)) for shape in shapes)
+        raise InputError(f"gave x, y, z and weight of the shapes {said} where [N] is wanted for all", field=where)
+    view = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), view)
+    fine = jnp.isfinite(view.x + view.y + view.z + view.weight) & (view.weight >= 0)
+    clean = jax.tree.map(lambda leaf: jnp.where(fine, leaf, 0.0), view)
+    return replace(clean, weight=jnp.where(jnp.all(fine), clean.weight, jnp.nan))

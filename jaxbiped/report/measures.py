@@ -1,0 +1,47 @@
+"""What strategies are compared by, and how it is said."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from jaxbiped.study import Comparison
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One thing that strategies are compared by, and how it is said."""
+
+    name: str
+    unit: str  # for people
+    scale: float  # from SI to that unit
+    digits: int
+    more: str  # what a greater value means
+    less: str
+    smaller_is_better: bool
+
+    @property
+    def title(self) -> str:
+        """The name with its unit."""
+        return f"{self.name}, {self.unit}" if self.unit else self.name
+
+
+SUCCESS = Measure("success", "points", 100.0, 1, "more often", "less often", False)
+DISTANCE = Measure("distance", "cm", 100.0, 1, "more", "less", True)
+TIME = Measure("time", "min", 1 / 60, 2, "more", "less", True)
+MEASURES = (SUCCESS, DISTANCE, TIME)
+
+
+def metric_measure(name: str) -> Measure:
+    """How the metric of a column is said: as it says itself, where it is registered here; nothing is imported."""
+    from jaxbiped.core.registry import METRICS
+    from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
+
+    if name not in METRICS:
+        return Measure(name, "", 1.0, 3, "more", "less", True)
+    metric = METRICS.held[name]
+    return Measure(name, metric.unit, metric.scale, metric.digits, "more", "less", metric.smaller_is_better)
+
+
+def metric_measures(comparison: Comparison) -> tuple[Measure, ...]:
+    """Those that a comparison has beside success, distance and time."""
+    return tuple(map(metric_measure, comparison.metrics))
