@@ -10,7 +10,7 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import pydantic
 
@@ -40,8 +40,6 @@ COMMANDS = {
 ON_FOLDERS = {"compare": ("stored", "StoredArgs")}
 ON_SCENES = ("compare",)  # commands whose first arguments may be scenes, or a folder of them
 WITHOUT_DEVICES = ("cache",)
-# Options of a mission on which the defaults of other options depend.
-EARLY = ("preset", "executor", "sensor", *(f"camera.{name}" for name in ("width", "height", "columns", "rows")))
 WRONG_INPUT = 2  # exit status
 
 
@@ -113,6 +111,9 @@ def dispatch(name: str, rest: list[str]) -> int:
     """Parse the options of a command, and run it."""
     import tyro
 
+    from jaxbiped.commands.early_options import with_early
+    from jaxbiped.commands.short_help import is_asked, print_help
+
     module_name, options_name, _, takes_file = COMMANDS[name]
     if name in ON_SCENES:
         rest = with_scenes(rest)
@@ -122,12 +123,14 @@ def dispatch(name: str, rest: list[str]) -> int:
     extra = {}
     path = Path(rest.pop(0)) if takes_file and rest and not rest[0].startswith("-") else None
     data = load_toml(path) if path else {}
-    if "mission" in options.model_fields:
-        data = with_early(data, rest, options.model_fields["mission"].annotation)
+    data = with_early(data, rest, options, path)
     if data or path:
         required = {name for name, field in options.model_fields.items() if field.is_required()}
         known = defaults(options, data | dict.fromkeys(required, "-"), path)
         extra["default"] = known.model_copy(update=dict.fromkeys(required, tyro.MISSING))
+    if is_asked(rest):
+        print_help(options, name, rest, extra.get("default"))
+        raise SystemExit(0)
     said = io.StringIO()
     try:
         with contextlib.redirect_stderr(said):
@@ -158,40 +161,6 @@ def with_scenes(rest: list[str]) -> list[str]:
     options = rest[len(first) :]
     count = [] if any(word.split("=")[0] == "--arenas" for word in options) else ["--arenas", str(len(files))]
     return ["--families", *map(str, files), *count, *options]
-
-
-def with_early(data: dict[str, Any], rest: list[str], mission: type[Model]) -> dict[str, Any]:
-    """`data` of a TOML file with those options of the mission in it that decide the defaults of others.
-
-    They must be known before the others are read: the camera's size and rays, too, for the rays of a `--preset` need
-    only go with the size that it is given. What cannot be right is left for the parser to refuse.
-    """
-    found = {}
-    for option in EARLY:
-        words = [value_of(option, word, following) for word, following in itertools.pairwise([*rest, ""])]
-        words = [word for word in words if word]
-        choices = get_args(mission.model_fields[option].annotation) if "." not in option else ()
-        if not words or (choices and words[-1] not in choices):
-            continue
-        part, _, name = option.rpartition(".")
-        if not part:
-            found[name] = words[-1]
-        elif words[-1].isascii() and words[-1].isdigit() and len(words[-1]) < 10:
-            found[part] = found.get(part, {}) | {name: int(words[-1])}
-    given = data.get("mission", {})
-    if not found or not isinstance(given, dict):
-        return data
-    merged = {name: given[name] | value if isinstance(value, dict) and isinstance(given.get(name), dict) else value
-              for name, value in found.items()}  # fmt: skip
-    return data | {"mission": given | merged}
-
-
-def value_of(option: str, word: str, following: str) -> str | None:
-    """What a word of the command line, with the one that follows it, says that the option is; None for other words."""
-    name, equals, value = word.partition("=")
-    if name.replace("_", "-") != f"--{option}":
-        return None
-    return value if equals else following
 
 
 def defaults(options: type[Model], data: dict[str, Any], path: Path | None) -> Model:
@@ -278,7 +247,8 @@ def is_rule(row: str) -> bool:
 def usage() -> str:
     """What `jaxbiped --help` prints."""
     lines = "\n".join(f"  {name:<10} {summary}" for name, (_, _, summary, _) in COMMANDS.items())
-    return f"usage: jaxbiped COMMAND [options]\n\n{lines}\n\n`jaxbiped COMMAND --help` lists its options."
+    end = "`jaxbiped COMMAND --help` shows the options that most people need, --help-all shows all of them."
+    return f"usage: jaxbiped COMMAND [options]\n\n{lines}\n\n{end}"
 
 
 if __name__ == "__main__":

@@ -7,9 +7,10 @@ import json
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 import pydantic
+from pydantic_core import PydanticCustomError
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import read_text
@@ -104,6 +105,11 @@ def input_error(error: pydantic.ValidationError, *, file: str | Path | None = No
     if prefix and field:
         field = prefix + field.removeprefix("mission.").replace("_", "-")
     return InputError(message, file=file, field=field, value=value)
+
+
+def told(message: str) -> NoReturn:
+    """Raise an error for a pydantic validator whose message says which value is wrong."""
+    raise PydanticCustomError("told", "{message}", {"message": message})
 
 
 def config_hash(model: Model) -> str:

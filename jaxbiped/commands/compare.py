@@ -12,8 +12,7 @@ from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
-from jaxbiped.report.summary import write_report
-from jaxbiped.report.tables import terminal
+from jaxbiped.report.folder_report import terminal_report, write_report
 from jaxbiped.study.comparison import default_pairs
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.conduct import conduct, never
@@ -56,7 +55,7 @@ def main(args: CompareArgs) -> int:
     ):
         manifest = conduct(out, config, resume=args.resume, on_progress=show, enough=enough, **how)
     report = write_report(out)
-    console.print(terminal(report.comparison))
+    console.print(terminal_report(report))
     for sentence in report.remarks:
         console.print(sentence, highlight=False)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"

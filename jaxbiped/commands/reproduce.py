@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from jaxbiped.arenas import Arena
 from jaxbiped.commands.options.reproduce import ReproduceArgs
-from jaxbiped.config import config_hash
+from jaxbiped.config import config_hash, parse
 from jaxbiped.files import refuse_existing
 from jaxbiped.mission.settings import SIMULATED, MissionConfig
 from jaxbiped.report.reproduction.files import write
@@ -43,9 +43,11 @@ def main(args: ReproduceArgs) -> int:
       InputError: no scenes, nothing to render with, a biped that cannot be simulated, a folder that exists or cannot
         be written.
     """
-    out = args.out or Path("results") / f"reproduce-{config_hash(args.model_copy(update={'out': None}))}"
+    own = own_parts(args)
+    config = parse(MissionConfig, {"sensor": args.sensor, "executor": args.executor} | own)
+    identity = config_hash(args.model_copy(update={"out": None})) + (f"-{config_hash(config)}" if own else "")
+    out = args.out or Path("results") / f"reproduce-{identity}"
     refuse_existing(out)
-    config = MissionConfig(sensor=args.sensor, executor=args.executor)
     arenas = load_scenes(args.scenes, (*(item.scene for item in EXPERIMENTS), *SCENES))
     if config.executor in SIMULATED:
         from jaxbiped.mission.walking import rehearse  # loads MuJoCo
@@ -59,11 +61,19 @@ def main(args: ReproduceArgs) -> int:
         "Device": jax.devices()[0].platform,
         "Versions": ", ".join(f"{name} {version}" for name, version in store.versions().items()),
     }
-    files = write(out, found, args.model_dump(mode="json"), facts, command_line())
+    files = write(out, found, args.model_dump(mode="json") | own, facts, command_line())
     for sentence in answer(found):
         console.print(sentence, highlight=False)
     console.print(f"written {out}: {', '.join(files)}", highlight=False)
     return 0
+
+
+def own_parts(args: ReproduceArgs) -> dict[str, str]:
+    """What the missions of the scenes have of the user's own, in place of the paper's robot, camera and preset."""
+    given = {"robot": args.robot_file, "camera": args.camera_file}
+    files = {part: str(path) for part, path in given.items() if path is not None}
+    preset = type(args).model_fields["preset"].default
+    return files | ({"preset": args.preset} if args.preset != preset else {})
 
 
 def gather(args: ReproduceArgs, arenas: dict[str, Arena], config: MissionConfig, console: Console) -> Findings:

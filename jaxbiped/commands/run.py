@@ -14,6 +14,7 @@ from jaxbiped.commands.options.run import RunArgs
 from jaxbiped.config import config_hash
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.pose_error import pose_facts, pose_sentence
 from jaxbiped.mission.recording import FILE, save_log
 from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import find_strategy
@@ -65,6 +66,7 @@ def main(args: RunArgs) -> int:
         write_whole(folder / "mission.json", lambda file: file.write((json.dumps(facts, indent=2) + "\n").encode()))
         save_log(folder / FILE, mission.log, facts)
     print(sentence(mission))
+    print(pose_sentence(mission.log))
     print(f"written {out}: map.png, mission.gif, mission.json, {FILE}")
     return 0 if mission.code == Code.REACHED else NOT_REACHED
 
@@ -89,5 +91,6 @@ def summary(args: RunArgs, name: str, mission: Mission) -> dict:
         "distance": mission.distance,
         "time": mission.time,
         "measurements": mission.measurements,
+        **pose_facts(mission.log),
         "played": [vars(played) for played in mission.played],
     }

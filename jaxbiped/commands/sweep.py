@@ -13,8 +13,7 @@ from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
-from jaxbiped.report.sweep import terminal, write_sweep_report
-from jaxbiped.report.sweep_page import write_sweep_page
+from jaxbiped.report.folder_report import terminal_report, write_report
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.evaluate import WORKERS
@@ -60,9 +59,8 @@ def main(args: SweepArgs) -> int:
     with engine(args, console, len(shards(config, len(groups), swept=True))) as how, progress(console) as show:
         manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show, **how)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
-    report = write_sweep_report(out)
-    files = (write_sweep_page(report), *report.files)
-    console.print(terminal(report))
-    names = ", ".join(["rows", "points.parquet", "manifest.json", *(path.name for path in files)])
+    report = write_report(out)
+    console.print(terminal_report(report))
+    names = ", ".join(["rows", "points.parquet", "manifest.json", *(path.name for path in report.files)])
     console.print(f"{manifest.rows} missions in {spent}; written {out}: {names}", highlight=False)
     return 0

@@ -12,8 +12,11 @@ from jaxbiped.config import Model
 from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
 from jaxbiped.core.registry import PLACE, Registry
 from jaxbiped.core.registry import SENSORS as SENSORS_OWN
-from jaxbiped.errors import InputError
 from jaxbiped.mapping.config import MapConfig
+from jaxbiped.mission.defaults import BELOW_POINTS as BELOW_POINTS
+from jaxbiped.mission.defaults import SIMULATED as SIMULATED
+from jaxbiped.mission.defaults import SWAYING as SWAYING
+from jaxbiped.mission.defaults import with_defaults
 from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.config import HEIGHT_TOLERANCE, DurationConfig, RobotConfig
 from jaxbiped.sensing.config import CameraConfig, LandmarkConfig, NoiseConfig, OdometryConfig, VisualConfig
@@ -27,10 +30,6 @@ if TYPE_CHECKING:
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
 HEADROOM = 12  # levels above that of the highest ground that a map holds: those within a standing robot of 38.5 cm
-SWAYING = 0.125  # [m] default of `robot.radius` for all executors but `kinematic`: a walking biped sways, and its
-# stereo camera, as wide as the body, sweeps 12 cm to either side
-BELOW_POINTS = 50.0  # default of `mapping.below_points` for rendered stereo; others keep the map that was published
-SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 RENDERED = ("stereo",)  # sensors that measure on the host
 SENSORS, EXECUTORS = ("raycast", "oracle", *RENDERED), ("kinematic", "sampled", *SIMULATED)  # that are built in
 VISUAL = ("visual", "both")  # localisations that measure the motion between two views
@@ -127,26 +126,26 @@ class MissionConfig(Model):
     """One kind of mission. Every default is the paper's value, or named where it is chosen."""
 
     sensor: SensorName = "raycast"
-    """raycast, oracle (knows all), stereo (pairs of pictures, rendered and matched on the host), or your own, as
-    package.module:name."""
+    """What the robot sees with: raycast (noisy rays), oracle (the truth), stereo, or package.module:name. Rays have the
+    noise of a stereo camera; the pictures of `stereo` are rendered and matched on the host."""
     preset: str = "rendered"
-    """How well the camera measures, the default of each number of `stereo` and `landmarks`: ideal, rendered, real, or a
-    sensor file (.toml), as `jaxbiped fit-sensor` writes it, which says how many rays the camera has, too. What is given
-    beside it wins; the rays need only divide the camera's size as it then is."""
+    """How well the camera measures: ideal, rendered, real, or a sensor file (.toml). It is the default of each number
+    of `stereo` and `landmarks`. A file, as `jaxbiped fit-sensor` writes it, may say how many rays the camera has, too.
+    What is given beside it wins; the rays need only divide the camera's size as it then is."""
     executor: ExecutorName = "kinematic"
-    """kinematic, sampled (moves as simulated bipeds were measured to: `library`), native or mjx (simulated bipeds, in
-    MuJoCo's own batch or in MJX), or your own, as package.module:name."""
+    """How it moves: kinematic (exactly), sampled (as simulated bipeds did), native or mjx (simulated), or
+    package.module:name. What simulated bipeds did is in `library`; `native` is MuJoCo's own batch."""
     localisation: Literal["landmarks", "odometry", "visual", "icp", "both"] = "landmarks"
-    """How the robot knows where it stands: dead reckoning, corrected by landmarks, by nothing (`odometry`), by the
-    motion that two views tell (`visual`), by walls measured before (`icp`), or by the last two. The paper has the
-    first alone; without landmarks there are none in the arena. The sensor `oracle` knows the pose."""
+    """What corrects dead reckoning: landmarks, odometry (nothing), visual (the motion that two views tell), icp (walls
+    measured before), or both (the last two). The paper has the first alone; without landmarks there are none
+    in the arena. The sensor `oracle` knows the pose."""
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False
     """May an oblique move pass one blocked cell?"""
     planner: Literal["cell", "heading"] = "cell"
-    """`cell`: the least cost by Eq. 1 (the paper's). `heading`: the least time over cells and headings, turns counted;
-    of the costs, C4 alone still counts there."""
+    """What is planned: the cell path of least cost by Eq. 1 (the paper's), or the heading path, of the least time over
+    cells and headings, turns counted. Of the costs, C4 alone still counts for `heading`."""
     foot_placement: bool | None = None
     """Are the feet placed by measured edges? Else edges are crossed from cell to cell, as in the paper. By default for
     all executors but `kinematic`."""
@@ -166,33 +165,8 @@ class MissionConfig(Model):
 
     @pydantic.model_validator(mode="before")
     @classmethod
-    def _fill_in(cls, data):
-        """What is not given comes from the preset, field by field; the radius depends on who walks, the rule of
-        walls on what it sees with."""
-        if isinstance(data, dict) and data.get("executor", "kinematic") != "kinematic":
-            robot = data.get("robot", {})
-            data = data | {"robot": {"radius": SWAYING} | robot if isinstance(robot, dict) else robot}
-        if isinstance(data, dict):
-            limits, robot = data.get("limits", {}), data.get("robot", {})
-            bears = limits.get("height_tolerance") if isinstance(limits, dict) else None
-            bears = getattr(limits, "height_tolerance", bears)  # a config, or something wrong
-            if isinstance(robot, dict) and bears is not None:
-                data = data | {"robot": {"height_tolerance": bears} | robot}
-        if isinstance(data, dict) and data.get("sensor") == "stereo":
-            rules = data.get("mapping", {})
-            data = data | {"mapping": {"below_points": BELOW_POINTS} | rules if isinstance(rules, dict) else rules}
-        try:
-            preset = sensor_preset(data.get("preset", "rendered"))
-        except (InputError, AttributeError, TypeError):
-            return data  # what is wrong is said of the field itself
-        filled = {}
-        for name in ("stereo", "landmarks"):
-            given = data.get(name, {})
-            filled[name] = getattr(preset, name).model_dump() | given if isinstance(given, dict) else given
-        camera = data.get("camera", {})
-        if preset.rays and isinstance(camera, dict):
-            filled["camera"] = preset.rays.model_dump() | camera
-        return data | filled
+    def _fill_in(cls, data: Any) -> Any:
+        return with_defaults(data) if isinstance(data, dict) else data
 
     @pydantic.field_validator("preset")
     @classmethod

@@ -45,6 +45,7 @@ class Thought:
     pose: Pose  # [B] as believed
     view: View  # [B N] what was measured
     evidence: Float[Array, "B H W Z"]  # of the 3D grid, with that view
+    landmarks: Bool[Array, "B L"]  # that were seen
 
 
 @with_own_settings
@@ -91,7 +92,8 @@ def decide(
         code = jnp.where(route.fault == TOO_SLOW, Code.PLANNER_TIMEOUT, Code.PLANNER_FAILED)
         verdict = jnp.where(route.fault == FINE, verdict, code).astype(jnp.int32)
     evidence = mind.grid_map.evidence
-    return mind, command, verdict, Thought(classes, levels, problem, route, mind.belief.pose, view, evidence)
+    thought = Thought(classes, levels, problem, route, mind.belief.pose, view, evidence, sightings.seen)
+    return mind, command, verdict, thought
 
 
 def counted(planned: Planned, route: Route) -> Planned:

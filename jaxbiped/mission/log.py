@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int8, UInt8
+from jaxtyping import Bool, Float, Float32, Int, Int8, UInt8
 
 SHORTEST = 1e-3  # [m] a shorter way is none, as in `arenas.movers`
 KINDS = ("obstacle", "bump", "gate")  # of an outline
@@ -91,6 +91,7 @@ class MissionLog:
     outcome: str = ""  # how it ended, "reached" say
     true_z: Float[np.ndarray, "T"] | None = None  # [m] height of the ground that the robot stood on
     squat: Bool[np.ndarray, "T"] | None = None  # its stance
+    seen: Int[np.ndarray, "T"] | None = None  # landmarks that were seen by the last measurement
     points: tuple[Float32[np.ndarray, "_ 3"], ...] = ()  # T clouds [m] that were measured last, world as believed
     voxels: Bool[np.ndarray, "T H W Z"] | None = None  # occupied; k: (k - 1/2) to (k + 1/2) `level_height`
     level_height: float = 0.03  # [m]
@@ -102,7 +103,7 @@ class MissionLog:
         for name in ("classes", "levels", "true_xyyaw", "estimated_xyyaw", "plan", "action"):
             if len(getattr(self, name)) != count or count == 0:
                 raise ValueError(f"{name} has {len(getattr(self, name))} moments, time has {count}; at least 1 each")
-        for name in ("pictures", "points", "true_z", "squat", "voxels"):
+        for name in ("pictures", "points", "true_z", "squat", "seen", "voxels"):
             held = getattr(self, name)
             if held is not None and len(held) not in (0, count):
                 raise ValueError(f"{name} has {len(held)} moments, time has {count}; as many, or none")

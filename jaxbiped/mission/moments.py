@@ -33,6 +33,7 @@ def moment(world: World, thought: Thought, settings: Settings, program: Program,
         "action": action,
         "z": float(world.pose.z[0]),
         "squat": bool(world.squat[0]),
+        "seen": int(np.asarray(thought.landmarks[0]).sum()),
         "points": points[counts],
         "voxels": voxels,
     }
@@ -76,6 +77,7 @@ def nothing(world: World, program: Program) -> dict:
         "action": "Start",
         "z": float(world.pose.z[0]),
         "squat": bool(world.squat[0]),
+        "seen": 0,
         "points": np.zeros((0, 3), np.float32),
         "voxels": np.zeros((*program.spec.shape, program.spec.levels + program.spec.lowest), bool),
     }

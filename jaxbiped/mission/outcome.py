@@ -6,7 +6,7 @@ import enum
 
 
 class Code(enum.IntEnum):
-    """The one code that each mission ends with."""
+    """The one code that each mission ends with. It prints as its label, and is a number in arrays."""
 
     RUNNING = -1
     REACHED = 0  # stands within 10 cm of the goal (paper, 3.1)
@@ -24,3 +24,12 @@ class Code(enum.IntEnum):
     def label(self) -> str:
         """As in tables."""
         return self.name.lower()
+
+    def __str__(self) -> str:
+        return self.label
+
+    def __repr__(self) -> str:
+        return f"<Code {self.label}>"
+
+    def __format__(self, spec: str) -> str:
+        return format(self.label, spec)

@@ -27,7 +27,7 @@ MILLIMETRE, FAR = 1000.0, 32.0  # [1/m] in which points are written; [m] and how
 FRACTION = 64.0  # [1/px] in which disparities are written
 QUALITY = 88  # of JPEG
 WHOLE = ("classes", "levels", "true_xyyaw", "estimated_xyyaw", "time", "origin_xy", "size_xy", "goal_xy")
-OPTIONAL = ("true_z", "squat")
+OPTIONAL = ("true_z", "squat", "seen")
 NAMED = ("pitch", "level_height", "outcome")  # plain values
 
 

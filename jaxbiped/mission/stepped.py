@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import jax
@@ -51,8 +51,8 @@ class Mission:
     distance: float  # [m]
     time: float  # [s]
     measurements: int
-    played: tuple[Played, ...]
-    log: MissionLog
+    played: tuple[Played, ...] = field(repr=False)
+    log: MissionLog = field(repr=False)
 
 
 turn_once = partial(jax.jit, static_argnames=("program",))(cycle)
@@ -180,6 +180,7 @@ class Recorder:
             outcome=code.label,
             true_z=np.array([m["z"] for m in moments]),
             squat=np.array([m["squat"] for m in moments]),
+            seen=np.array([m["seen"] for m in moments]),
             points=tuple(m["points"] for m in moments),
             voxels=np.stack([m["voxels"] for m in moments]),
             level_height=self.program.spec.level_height,

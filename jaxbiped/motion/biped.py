@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import pydantic
 
 from jaxbiped.config import Model
+from jaxbiped.core.config_file import FileModel
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,7 +122,7 @@ class ContactConfig(Model):
     """Sliding friction between a foot and the ground."""
 
 
-class RobotModelConfig(Model):
+class RobotModelConfig(FileModel):
     """A biped of six joints a leg; by default the ZMP e-nuvo WALK ver. 3 of the paper (3.1).
 
     Known: 35 x 16 x 14 cm without the camera; 3 hip, 1 knee and 2 ankle joints a leg; steps of 3 cm. The rest is

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import pydantic
 
 from jaxbiped.config import Model
+from jaxbiped.core.config_file import FileModel
 
 if TYPE_CHECKING:
     from jaxbiped.mapping.grid import Body
@@ -60,7 +61,7 @@ class FootingConfig(Model):
         return Footing(**{field.name: jnp.float32(getattr(self, field.name)) for field in fields(Footing)})
 
 
-class RobotConfig(Model):
+class RobotConfig(FileModel):
     """A biped as an upright cylinder that can squat (paper, 2.2, Fig. 4); by default the e-nuvo WALK of the paper."""
 
     radius: Annotated[float, pydantic.Field(gt=0.0, le=0.15)] = 0.10

@@ -7,7 +7,9 @@ lazy_package(
     {
         "animation": "save_gif",
         "pictures": "draw_map save_map save_mission",
-        "summary": "Report write_report",
+        "summary": "Report",
+        "sweep": "SweepReport",
+        "folder_report": "write_report",
         "tables": "comparison_table terminal",
     },
 )

@@ -34,8 +34,8 @@ from jaxbiped.report.pictures import (
     draw_lines,
     draw_terrain,
     frame,
-    legend,
     mark_patch,
+    mission_legend,
     moment,
 )
 from jaxbiped.report.style import own_style
@@ -54,7 +54,7 @@ class Scene:
 
     def __init__(self, log: MissionLog, title: str, dpi: int):
         self.log, self.k, self.title = log, CENTIMETRES.per_metre, title
-        height = WIDTH * float(log.size_xy[1] / log.size_xy[0]) + 0.75
+        height = WIDTH * float(log.size_xy[1] / log.size_xy[0]) + 1.1
         beside = PICTURE_WIDTH if log.pictures else 0.0
         self.figure = Figure(figsize=(WIDTH + beside, height), dpi=dpi, layout="constrained")
         self.canvas = FigureCanvasAgg(self.figure)
@@ -65,7 +65,7 @@ class Scene:
             self.draw_pictures(axes["left"], axes["disparity"])
         else:
             self.ax = self.figure.subplots()
-        legend(self.figure, track=True, truth=bool(log.outlines))
+        mission_legend(self.figure, log)
         self.draw_still()
         self.image = self.ax.imshow(class_image(log.classes[0], log.levels[0]), origin="lower", extent=self.extent)
         self.draw_moving()

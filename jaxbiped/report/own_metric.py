@@ -30,15 +30,16 @@ def own_estimate(rows: pl.DataFrame, metric: str, seed: int = 0) -> Estimate:
 
 
 @own_style()
-def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str) -> Figure:
+def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str, size: tuple[float, float] = (6.4, 4.0)) -> Figure:
     """The figure.
 
     Args:
       points: as `store.read_points` gives them, with one swept field at most.
+      size: [inch] width and height.
     """
     measure = next((item for item in MEASURES if item.name == metric), None) or metric_measure(metric)
     strategies, fields = ordered(rows["strategy"].unique()), [name for name in points.columns if name != "point"]
-    figure, ax = canvas(6.4, 4.0)
+    figure, ax = canvas(*size)
     places = points[fields[0]].to_numpy() if fields else np.zeros(1)
     shifts = np.zeros(len(strategies)) if fields else np.arange(len(strategies))
     for shift, name in zip(shifts, strategies, strict=True):
@@ -55,7 +56,7 @@ def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str) -> Figure:
     if fields:
         scale_x(ax, list(map(float, places)))
         ax.set_xlabel(fields[0])
-        legend_above(figure, ax)
+        legend_above(figure, ax, columns=3)
     else:
         ax.set_xticks(range(len(strategies)), strategies, rotation=20 if len(strategies) > 4 else 0)
         ax.set_xlim(-0.5, len(strategies) - 0.5)

@@ -18,7 +18,7 @@ from jaxbiped.report.tables import (
     metric_sheet,
     metric_stratum_sheet,
     pair_sheet,
-    strategy_sheet,
+    strategy_sheets,
     stratum_sheet,
     success_sheet,
 )
@@ -109,7 +109,7 @@ def sections(frame: pl.DataFrame, comparison: Comparison) -> tuple[Section, ...]
     drawn = plots(frame, comparison)
     kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
     found = [
-        Section("Strategies", plots=tuple(drawn["strategies"]), grids=(to_grid(strategy_sheet(comparison)),)),
+        Section("Strategies", plots=tuple(drawn["strategies"]), grids=tuple(map(to_grid, strategy_sheets(comparison)))),
     ]
     if comparison.question:
         first, second = comparison.question

@@ -12,7 +12,6 @@ from jaxtyping import Float, Int8, UInt8
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.transforms import Affine2D
 
 from jaxbiped.arenas.arena import DISC_RADIUS, SQUARE_SIDE
@@ -23,18 +22,16 @@ from jaxbiped.mission.log import Ground, Mark, MissionLog, Outline
 from jaxbiped.report.axis import CENTIMETRES as CENTIMETRES
 from jaxbiped.report.axis import METRES as METRES
 from jaxbiped.report.axis import Axis as Axis
+from jaxbiped.report.map_legend import draw_legend
+from jaxbiped.report.palette import BUMP_SHADES as BUMP_SHADES
+from jaxbiped.report.palette import COLOURS as COLOURS
+from jaxbiped.report.palette import INK as INK
+from jaxbiped.report.palette import MARKS
+from jaxbiped.report.palette import OUTLINES as OUTLINES
+from jaxbiped.report.palette import PLAN as PLAN
+from jaxbiped.report.palette import TRACK as TRACK
 from jaxbiped.report.style import own_style
 
-COLOURS = {
-    Cell.UNMEASURED: "#ffffff",
-    Cell.FLOOR: "#cfcfcf",
-    Cell.BUMP: "#7db1e6",
-    Cell.GATE: "#b186d3",
-    Cell.OBSTACLE: "#d9534f",
-}
-BUMP_SHADES = ("#7db1e6", "#4a8ad4", "#2763ab")  # one step from the base floor, two, more
-PLAN, TRACK, INK = "#118a2e", "#222222", "#333333"
-OUTLINES = {"obstacle": "#8e1f1c", "bump": "#163f75", "gate": "#5b2a86"}
 GOAL_RADIUS = 0.10  # [m] "reached" (paper, 3.1)
 MOST_CELLS_LINED = 6000  # beyond, cells are too small for lines around them and numbers in them
 MOST_SHADE = 0.55  # of opacity of the shadows of terrain
@@ -100,7 +97,7 @@ def draw_map(
     if start_xy is not None:
         ax.plot(start_xy[0] * k, start_xy[1] * k, "o", ms=8, mfc="white", mec=INK, mew=1.6, zorder=7)
     if goal_xy is not None:
-        draw_goal(ax, goal_xy, goal_radius if small else None, k)
+        draw_goal(ax, goal_xy, goal_radius, k)
     corners = turn.transform([(x0, y0), (x1, y0), (x0, y1), (x1, y1)])
     (x0, y0), (x1, y1) = corners.min(0), corners.max(0)
     frame(ax, (x0, x1, y0, y1), axis)
@@ -178,12 +175,16 @@ def mark_patch(mark: Mark, k: float) -> patches.Patch:
     """A landmark: a red disc or a blue square, as in the paper."""
     x, y = mark.xy[0] * k, mark.xy[1] * k
     if mark.kind == "circle":
-        return patches.Circle((x, y), DISC_RADIUS * k, fc="#ff3b3028", ec="#ff3b30", lw=1.3, zorder=2.5)
+        return patches.Circle((x, y), DISC_RADIUS * k, **face(mark), lw=1.3, zorder=2.5)
     side, corner = SQUARE_SIDE * k, SQUARE_SIDE * k / 2
     angle = math.degrees(mark.yaw)
-    return patches.Rectangle(
-        (x - corner, y - corner), side, side, angle=angle, rotation_point="center", fc="#0a60ff", ec="white", zorder=2.5
-    )
+    corner_xy, about = (x - corner, y - corner), {"angle": angle, "rotation_point": "center"}
+    return patches.Rectangle(corner_xy, side, side, **about, **face(mark), zorder=2.5)
+
+
+def face(mark: Mark) -> dict[str, str]:
+    """Colours of a landmark's inside and rim."""
+    return {"fc": MARKS[mark.kind]["mfc"], "ec": MARKS[mark.kind]["mec"]}
 
 
 def frame(ax: Axes, extent: tuple[float, float, float, float], axis: Axis) -> None:
@@ -194,20 +195,6 @@ def frame(ax: Axes, extent: tuple[float, float, float, float], axis: Axis) -> No
     ax.tick_params(labelsize=8, color=INK)
     for spine in ax.spines.values():
         spine.set(color="#888888", linewidth=0.8)
-
-
-def legend(figure: Figure, *, plan: bool = True, track: bool = False, truth: bool = False) -> None:
-    """One row under the figure that says what colours and lines mean."""
-    handles = [patches.Patch(fc=COLOURS[cell], ec="#888888", lw=0.6, label=cell.name.lower()) for cell in Cell]
-    if truth:
-        handles.append(patches.Patch(fill=False, ec=INK, lw=1.2, label="true outline"))
-    if plan:
-        handles.append(Line2D([], [], color=PLAN, lw=2, marker=">", ms=5, label="plan"))
-    if track:
-        handles.append(Line2D([], [], color=TRACK, lw=1.6, marker="o", ms=3, label="walked"))
-    handles.append(Line2D([], [], ls="", marker="o", ms=7, mfc="white", mec=INK, mew=1.5, label="start"))
-    handles.append(Line2D([], [], ls="", marker="x", ms=7, mec=INK, mew=2, label="goal"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False, handlelength=1.6)
 
 
 @own_style()
@@ -225,7 +212,9 @@ def save_map(path: str | Path, grid: ClassGrid, *, title: str = "", **what) -> N
     ax = figure.subplots()
     draw_map(ax, grid, **what)
     ax.set_title(title, fontsize=10)
-    legend(figure, track=what.get("track_xy") is not None, truth=bool(what.get("outlines")))
+    circle = what.get("goal_radius", GOAL_RADIUS) if what.get("goal_xy") is not None else None
+    shown = {"track": what.get("track_xy") is not None, "landmarks": what.get("landmarks", ())}
+    draw_legend(figure, truth=bool(what.get("outlines")), circle=circle, **shown)
     save_figure(figure, path)
 
 
@@ -259,8 +248,14 @@ def save_mission(path: str | Path, log: MissionLog, *, title: str = "", panels: 
     for ax in axes[len(moments) :]:
         ax.remove()
     figure.suptitle(title, fontsize=11)
-    legend(figure, track=True, truth=bool(log.outlines))
+    mission_legend(figure, log)
     save_figure(figure, path)
+
+
+def mission_legend(figure: Figure, log: MissionLog) -> None:
+    """The legend of a mission's maps."""
+    what = {"truth": bool(log.outlines), "landmarks": log.landmarks, "circle": GOAL_RADIUS}
+    draw_legend(figure, track=True, grown=True, **what)
 
 
 def caption(log: MissionLog, t: int) -> str:

@@ -10,7 +10,7 @@ from jaxbiped.report.tables import (
     code_sheet,
     pair_sheet,
     short_stratum_sheet,
-    strategy_sheet,
+    strategy_sheets,
     stratum_sheet,
     success_sheet,
 )
@@ -27,7 +27,7 @@ def terminal_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
     first, second = comparison.question
     kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
     strata = [short_stratum_sheet(comparison, first, second, kind) for kind in kinds]
-    return (strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison), *strata)
+    return (*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison), *strata)
 
 
 def written_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
@@ -36,7 +36,7 @@ def written_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
     kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
     rates = [success_sheet(comparison, kind) for kind in kinds]
     strata = [stratum_sheet(comparison, first, second, kind) for kind in kinds]
-    return (strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison), *rates, *strata)
+    return (*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison), *rates, *strata)
 
 
 def equivalence_sheets(found: Sequence[Equivalence]) -> tuple[Sheet, ...]:

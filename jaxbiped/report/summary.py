@@ -48,8 +48,10 @@ class Report:
     remarks: tuple[str, ...] = ()  # what to know before anything else
 
 
-def write_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, examples: int = 0) -> Report:
-    """Read a results folder, compare its strategies, and write `report.html`, `summary.md` and figures into it.
+def write_comparison_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, examples: int = 0) -> Report:
+    """Compare the strategies of a results folder at one point: `report.html`, `summary.md` and figures are written.
+
+    `folder_report.write_report` knows sweeps, too.
 
     May be called again at any time: the same rows give the same report. Seeds the bootstraps with the study's seed.
 

@@ -11,12 +11,14 @@ from rich.console import Group
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import MEASURES, Measure, listed, part
+from jaxbiped.report.answer import MEASURES, Measure
 from jaxbiped.report.figures import saver
+from jaxbiped.report.sweep_answer import difference, sentences
 from jaxbiped.report.sweep_figures import sweep_figure
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
-from jaxbiped.report.words import NONE, brackets, number, percent, signed
-from jaxbiped.study import CODES, Manifest, PairComparison, read, read_points
+from jaxbiped.report.words import NONE, brackets, number, percent
+from jaxbiped.study import CODES, Manifest, read, read_points
+from jaxbiped.study.idle_axes import idle_spans
 from jaxbiped.study.pointwise import PointResult, SweepResult, pointwise
 
 SUMMARY, FIGURE = "summary.md", "sweep.png"
@@ -52,10 +54,12 @@ def write_sweep_report(folder: str | Path, *, resamples: int = 999) -> SweepRepo
     frame, manifest = read(folder)
     if frame.is_empty():
         raise InputError("has no rows to report on yet", file=folder)
-    result = pointwise(frame, read_points(folder), manifest.config, seed=manifest.seed, resamples=resamples)
+    points = read_points(folder)
+    result = pointwise(frame, points, manifest.config, seed=manifest.seed, resamples=resamples)
     figure, caption = sweep_figure(result, grid_axes(manifest))
     write_whole(folder / FIGURE, saver(figure))
-    shown, said = (*sheets(result), ending_sheet(frame, result.strategies)), sentences(result)
+    shown = (*sheets(result), ending_sheet(frame, result.strategies))
+    said = sentences(result, idle_spans(frame, points, changed_together(manifest)))
     text = summary(manifest, shown, said, caption)
     write_whole(folder / SUMMARY, lambda file: file.write(text.encode()))
     return SweepReport(folder, result, manifest, shown, said, (folder / SUMMARY, folder / FIGURE))
@@ -67,6 +71,12 @@ def grid_axes(manifest: Manifest) -> tuple[str, ...]:
         return ()
     axes = manifest.config.get("axes", ())
     return tuple(axis["field"] for axis in axes if axis["values"] is None or len(axis["values"]) > 1)
+
+
+def changed_together(manifest: Manifest) -> dict[str, tuple[str, ...]]:
+    """The field of each axis that has more than one value, and the fields that change together with it."""
+    together = {axis["field"]: tuple(axis.get("together", ())) for axis in manifest.config.get("axes", ())}
+    return {field: together[field] for field in grid_axes(manifest)}
 
 
 def terminal(report: SweepReport) -> Group:
@@ -144,38 +154,6 @@ def rate(point: PointResult, strategy: str) -> str:
     """A success rate with its interval."""
     value = point.success.get(strategy)
     return f"{percent(value.estimate)} {brackets(value, 100.0, 1, sign=False)}" if value else NONE
-
-
-def difference(pair: PairComparison | None, measure: Measure) -> str:
-    """A paired difference with its interval."""
-    if pair is None or not part(pair, measure)[0].valid:
-        return NONE
-    value = part(pair, measure)[0]
-    text = signed(value.estimate * measure.scale, measure.digits)
-    limits = brackets(value, measure.scale, measure.digits)
-    return text if limits == NONE else f"{text} {limits}"
-
-
-def sentences(result: SweepResult) -> tuple[str, ...]:
-    """At how many points the first of the question's pair is ahead, and where most."""
-    if result.question is None:
-        return ()
-    first, second = result.question
-    said = []
-    for measure in MEASURES:
-        found = [(point, part(point.pair, measure)[0]) for point in result.points if point.pair]
-        limits = [(point, value) for point, value in found if value.valid and value.low is not None]
-        sign = -1 if measure.smaller_is_better else 1
-        ahead = sum(min(sign * value.low, sign * value.high) > 0 for _, value in limits)
-        behind = sum(max(sign * value.low, sign * value.high) < 0 for _, value in limits)
-        text = f"{measure.name.capitalize()}: {first} is ahead of {second} at {ahead} of {len(found)} points"
-        said.append(f"{text}, behind at {behind}; elsewhere the interval holds zero, or there is none.")
-        if ahead or behind:
-            best, _ = max(limits, key=lambda item: sign * item[1].estimate)
-            at = listed([f"{name} = {number:.4g}" for name, number in best.values.items()])
-            amount = f"{difference(best.pair, measure)} {measure.unit}"
-            said[-1] += f" Most at {at}: {amount}."
-    return tuple(said)
 
 
 def summary(manifest: Manifest, tables: tuple[Sheet, ...], said: tuple[str, ...], caption: str) -> str:

@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import listed
+from jaxbiped.report.answer import DISTANCE, TIME, listed
 from jaxbiped.report.figures import INK, canvas, error_bars, legend_above, look
 from jaxbiped.report.grid import to_grid, typeset
+from jaxbiped.report.own_metric import own_metric
 from jaxbiped.report.page import PAGE, Section, page_of, render
 from jaxbiped.report.plots import WIDTH, Plot
 from jaxbiped.report.summary import LIMITATIONS, looked_at
@@ -36,7 +37,7 @@ def write_sweep_page(
       report: of the sweep.
       point: at which strategies are compared in full; by default that with the config's own values, else the first.
       resamples: of the bootstraps at that point.
-      examples: arenas to be played again and drawn there, see `summary.write_report`.
+      examples: arenas to be played again and drawn there, see `folder_report.write_report`.
 
     Raises:
       InputError: a point that has no rows, or a file that cannot be written.
@@ -48,7 +49,8 @@ def write_sweep_page(
     if chosen is None:
         allowed = f"must be a sweep point with rows, {result.points[0].index} to {result.points[-1].index}"
         raise InputError(allowed, file=folder, field="point", value=point)
-    frame = read(folder)[0].filter(pl.col("point") == point)
+    rows = read(folder).rows
+    frame = rows.filter(pl.col("point") == point)
     comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
     page = page_of(
         frame,
@@ -67,7 +69,7 @@ def write_sweep_page(
         kicker=kicker,
         answer=tuple(typeset(sentence) for sentence in report.sentences),
         keys=(),
-        sections=(over(report), Section(at, (text,)), *page.sections),
+        sections=(over(report, rows), Section(at, (text,)), *page.sections),
         warnings=() if manifest.state == "finished" else ("This sweep is not finished: points lack arenas.",),
     )
     path = folder / PAGE
@@ -87,8 +89,12 @@ def title(report: SweepReport) -> str:
     return f"How does the difference between {first} and {second} depend on {what}?"
 
 
-def over(report: SweepReport) -> Section:
-    """Figures and tables over all points."""
+def over(report: SweepReport, frame: pl.DataFrame) -> Section:
+    """Figures and tables over all points.
+
+    Args:
+      frame: the rows that it was made from.
+    """
     grids = []
     for sheet in report.sheets:
         (rows,) = sheet.groups
@@ -97,7 +103,10 @@ def over(report: SweepReport) -> Section:
             notes = (*notes, f"The first {MOST_ROWS} of {len(rows):,} points; summary.md has them all.")
         grids.append(to_grid(replace(sheet, groups=(rows[:MOST_ROWS],), notes=notes)))
     with themed():
-        plots = sweep_plots(report.result, grid_axes(report.manifest))
+        axes = grid_axes(report.manifest)
+        plots = sweep_plots(report.result, axes)
+        if len(axes) == 1:
+            plots = (plots[0], *own_plots(report.result, frame, axes[0]), *plots[1:])
     return Section("Over the sweep", plots=plots, grids=tuple(grids))
 
 
@@ -121,6 +130,20 @@ def sweep_plots(result: SweepResult, axes: tuple[str, ...]) -> tuple[Plot, ...]:
             one = replace(result, points=tuple(only(point, field) for point in result.points))
             drawn.append((f"sweep-{k}", dots(one), f"Each dot is a sweep point, drawn over {field}."))
     return tuple(Plot(inline(figure, name, caption), caption) for name, figure, caption in drawn)
+
+
+def own_plots(result: SweepResult, frame: pl.DataFrame, field: str) -> tuple[Plot, ...]:
+    """The mean distance and time of each strategy's own reached missions against one field."""
+    points = pl.DataFrame(
+        {"point": [point.index for point in result.points], field: [point.values[field] for point in result.points]},
+        schema={"point": pl.Int32, field: pl.Float64},
+    )
+    plots = []
+    for measure in (DISTANCE, TIME):
+        caption = f"Mean {measure.name} of each strategy's own reached missions, with intervals at 95 %."
+        figure = own_metric(frame, points, measure.name, (WIDTH, 3.4))
+        plots.append(Plot(inline(figure, f"sweep-own-{measure.name}", caption), caption))
+    return tuple(plots)
 
 
 def plain(panel: Panel) -> str:

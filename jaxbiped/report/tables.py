@@ -9,10 +9,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from jaxbiped.report.answer import ALPHA, DISTANCE, MEASURES, SUCCESS, TIME, Measure, answer, part
+from jaxbiped.report.answer import ALPHA, DISTANCE, MEASURES, SUCCESS, TIME, answer, part
 from jaxbiped.report.measures import metric_measures
 from jaxbiped.report.words import NONE, brackets, number, p_cell, percent, signed
-from jaxbiped.study import ALL, CODES, Comparison, PairComparison, PairedMetric
+from jaxbiped.study import ALL, CODES, Comparison, Estimate, PairComparison, PairedMetric
 
 Row = tuple[str, ...]
 
@@ -66,7 +66,7 @@ def comparison_table(comparison: Comparison) -> Table:
 
 def terminal(comparison: Comparison) -> Group:
     """What a comparison prints, 80 columns wide: strategies, failures, pairs, the question by family, the answer."""
-    sheets = [strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison, detailed=1)]
+    sheets = [*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison, detailed=1)]
     if comparison.question and comparison.metrics:
         sheets.append(metric_sheet(comparison, *comparison.question))
     if comparison.question and len(comparison.strata("family")) > 1:
@@ -80,7 +80,7 @@ def terminal(comparison: Comparison) -> Group:
 
 def markdown_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
     """All tables of a comparison, in the order of `summary.md`."""
-    sheets = [strategy_sheet(comparison), code_sheet(comparison), pair_sheet(comparison)]
+    sheets = [*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison)]
     pairs = dict.fromkeys((pair.first, pair.second) for pair in comparison.pairs)
     if comparison.metrics:
         sheets += [metric_sheet(comparison, first, second) for first, second in pairs]
@@ -93,30 +93,46 @@ def markdown_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
     return tuple(sheet for sheet in sheets if sheet.groups)
 
 
-def strategy_sheet(comparison: Comparison) -> Sheet:
-    """Each strategy by itself: success with its interval, and the mean distance and time of its reached missions."""
+def strategy_sheets(comparison: Comparison) -> tuple[Sheet, Sheet]:
+    """Each strategy by itself: its success, and its reached missions."""
+    return success_overall(comparison), reached_sheet(comparison)
+
+
+def success_overall(comparison: Comparison) -> Sheet:
+    """Success of each strategy with its interval, and how much of what is missing no plan could have reached."""
     summaries = [comparison.summary(name) for name in comparison.strategies]
     rows = []
     for item in summaries:
         cells = (item.strategy, percent(item.success.estimate), brackets(item.success, 100.0, sign=False))
-        cells += (percent(item.reachable.estimate), percent(item.success_of_reachable.estimate))
-        rows.append((*cells, scaled(item.distance.estimate, DISTANCE, 1), scaled(item.time.estimate, TIME, 1)))
-    columns = (
-        "strategy",
-        "reached %",
-        f"{100 * comparison.level:g} % interval",
-        "plan\nexists %",
-        "reached\nof these %",
+        rows.append((*cells, percent(item.reachable.estimate), percent(item.success_of_reachable.estimate)))
+    columns = ("strategy", "reached %", interval_head(comparison), "plan\nexists %", "reached\nof these %")
+    notes = ("Wilson intervals. A plan exists: with perfect knowledge of the arena, for this strategy.",)
+    return Sheet(f"Strategies on {summaries[0].n} arenas", columns, (tuple(rows),), notes)
+
+
+def reached_sheet(comparison: Comparison) -> Sheet:
+    """The mean distance and time of each strategy's reached missions, with their intervals."""
+    rows = []
+    for name in comparison.strategies:
+        item = comparison.summary(name)
+        cells = (name, str(item.distance.n))
+        for measure in (DISTANCE, TIME):
+            mean: Estimate = getattr(item, measure.name)
+            cells += (number(mean.estimate * measure.scale if mean.valid else None, 1),)
+            cells += (brackets(mean, measure.scale, sign=False),)
+        rows.append(cells)
+    head = interval_head(comparison)
+    columns = ("strategy", "missions", "distance, cm", head, "time, min", head)
+    notes = (
+        "Means over a strategy's own reached missions, so over other arenas than another strategy's; BCa bootstrap "
+        "intervals.",
     )
-    return Sheet(
-        f"Strategies on {summaries[0].n} arenas",
-        (*columns, "distance\ncm", "time\nmin"),
-        (tuple(rows),),
-        (
-            "Wilson intervals. A plan exists: with perfect knowledge of the arena, for this strategy.",
-            "Distance and time: means over a strategy's own reached missions, so over different arenas.",
-        ),
-    )
+    return Sheet("Reached missions of each strategy", columns, (tuple(rows),), notes)
+
+
+def interval_head(comparison: Comparison) -> str:
+    """The head of a column of intervals."""
+    return f"{100 * comparison.level:g} % interval"
 
 
 def code_sheet(comparison: Comparison) -> Sheet:
@@ -127,11 +143,6 @@ def code_sheet(comparison: Comparison) -> Sheet:
     return Sheet("How missions ended", ("strategy", *(CODES[i].replace("_", " ") for i in seen)), (rows,))
 
 
-def scaled(value: float | None, measure: Measure, digits: int) -> str:
-    """An SI value in the measure's unit."""
-    return number(None if value is None else value * measure.scale, digits)
-
-
 def pair_sheet(comparison: Comparison, detailed: int | None = None) -> Sheet:
     """Pairs of strategies over all arenas: differences with intervals and corrected p-values.
 
@@ -139,7 +150,7 @@ def pair_sheet(comparison: Comparison, detailed: int | None = None) -> Sheet:
       detailed: how many of the pairs have medians and probabilities too; all by default.
     """
     pairs = [pair for pair in comparison.pairs if pair.stratum == ALL]
-    columns = ("first - second", "arenas", "difference", f"{100 * comparison.level:g} % interval", "p (Holm)")
+    columns = ("first - second", "arenas", "difference", interval_head(comparison), "p (Holm)")
     detailed = len(pairs) if detailed is None else detailed
     groups = tuple(tuple(pair_rows(pair, index < detailed)) for index, pair in enumerate(pairs))
     return Sheet("Pairs of strategies on the same arenas", columns, groups, PAIR_NOTES)

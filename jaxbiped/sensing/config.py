@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from pydantic import Field, model_validator
 
 from jaxbiped.config import Model
+from jaxbiped.core.config_file import FileModel
 
 if TYPE_CHECKING:
     from jaxbiped.sensing.camera import Camera, ImageSpec
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from jaxbiped.sensing.odometry import OdometryNoise
 
 
-class CameraConfig(Model):
+class CameraConfig(FileModel):
     """A stereo camera. Size and baseline are the paper's (3.1); the rest of it is chosen.
 
     At 97 degrees and 30 degrees of pitch the lintel of a gate is in view, which a lens of 66 degrees never sees.

@@ -17,6 +17,6 @@ lazy_package(
         "schema": "CODES FAMILIES KNOWN SCHEMA STRATEGIES validate",
         "sequential": "Goal Watch enough look",
         "sides": "Side Stored choose compare_sides open_stored",
-        "store": "Manifest Store create read read_manifest read_points scan",
+        "store": "Manifest Store StoredRows create read read_manifest read_points scan",
     },
 )

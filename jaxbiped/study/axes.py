@@ -7,9 +7,9 @@ from typing import Annotated
 import numpy as np
 import pydantic
 from jaxtyping import Float
-from pydantic_core import PydanticCustomError
 
 from jaxbiped.config import Model
+from jaxbiped.config import told as told
 
 MOST = 1_000_000  # values of an axis
 
@@ -140,8 +140,3 @@ def check_bounds(bounds: Bounds, low: str, high: str, log: bool) -> None:
         told(f"{low} must be below {high}: {bounds[0]:g} is not below {bounds[1]:g}")
     if log and bounds[0] <= 0:
         told(f"{low} must be above 0 on a log range, not {bounds[0]:g}")
-
-
-def told(message: str) -> None:
-    """Raise an error for a pydantic validator whose message says which value is wrong."""
-    raise PydanticCustomError("told", "{message}", {"message": message})

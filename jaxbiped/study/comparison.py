@@ -8,13 +8,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import polars as pl
+from jaxtyping import Float
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.intervals import NOTHING, Estimate, proportion
+from jaxbiped.study.intervals import NOTHING, Estimate, mean_and_median, proportion
 from jaxbiped.study.metric_pairs import corrected_metrics, metric_means, metric_pairs
 from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
 from jaxbiped.study.schema import CODES, metric_columns, ordered, ordered_families, validate
 
+OWN = 1  # of the seed of bootstraps that are of one strategy alone
 QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about
 
 
@@ -40,7 +42,8 @@ class StrategySummary:
     reachable: Estimate  # share of arenas with an oracle plan for this strategy
     success_of_reachable: Estimate  # success on those: what is missing is sensing's and walking's, not planning's
     codes: tuple[int, ...]  # missions by how they ended, in the order of CODES
-    distance: Estimate  # [m] mean over its own reached missions: other arenas than another strategy's
+    distance: Estimate  # [m] mean over its own reached missions: other arenas than another strategy's. It has an
+    # interval over all arenas; in families and thirds there are too many of them to compute
     time: Estimate  # [s] the same
     metrics: dict[str, Estimate] = field(default_factory=dict)  # of each other column: mean over missions that have it
 
@@ -153,11 +156,13 @@ def compare_named(
     """
     strategies = tuple(names)
     rng = np.random.default_rng(seed)
+    own = {"seed": int(np.random.default_rng([seed, OWN]).integers(2**32)), "resamples": resamples}
     summaries, compared, others = [], [], metric_columns(frame)
     leading = QUESTION if QUESTION in pairs else next(iter(pairs), None)
     for stratum, rows in strata(frame):
         by_name = {name: rows.filter(pl.col("strategy") == name) for name in strategies}
-        summaries += [summarise(stratum, name, by_name[name], level) for name in strategies]
+        of_means = own if stratum == ALL else None
+        summaries += [summarise(stratum, name, by_name[name], level, of_means) for name in strategies]
         for first, second in pairs:
             options = {"seed": int(rng.integers(2**32)), "resamples": resamples, "level": level}
             pair = compare_pair(stratum, (first, by_name[first]), (second, by_name[second]), **options)
@@ -185,15 +190,18 @@ def strata(frame: pl.DataFrame) -> Iterator[tuple[Stratum, pl.DataFrame]]:
             yield Stratum("difficulty", f"{rows['difficulty'].min():.2f} to {rows['difficulty'].max():.2f}"), rows
 
 
-def summarise(stratum: Stratum, strategy: str, rows: pl.DataFrame, level: float) -> StrategySummary:
-    """One strategy's rows of one stratum."""
+def summarise(
+    stratum: Stratum, strategy: str, rows: pl.DataFrame, level: float, of_means: dict[str, int] | None = None
+) -> StrategySummary:
+    """One strategy's rows of one stratum.
+
+    Args:
+      of_means: seed and resamples of the bootstraps of its means; None: they get no intervals.
+    """
     reached = rows.filter("success")
     reachable = rows.filter("reachable")
     counts = dict(rows["code"].value_counts().iter_rows())
-    means = {
-        name: Estimate(float(reached[name].mean()), n=len(reached)) if len(reached) else NOTHING
-        for name in ("distance", "time")
-    }
+    means = {name: own_mean(reached[name].to_numpy(), level, of_means) for name in ("distance", "time")}
     return StrategySummary(
         stratum=stratum,
         strategy=strategy,
@@ -205,6 +213,15 @@ def summarise(stratum: Stratum, strategy: str, rows: pl.DataFrame, level: float)
         metrics=metric_means(rows, metric_columns(rows)),
         **means,
     )
+
+
+def own_mean(samples: Float[np.ndarray, "n"], level: float, bootstrap: dict[str, int] | None) -> Estimate:
+    """The mean of one strategy's missions, with the interval that paired means have where a bootstrap is asked for."""
+    if len(samples) == 0:
+        return NOTHING
+    if bootstrap is None:
+        return Estimate(float(np.mean(samples)), n=len(samples))
+    return mean_and_median(samples, level=level, **bootstrap)[0]
 
 
 def compare_pair(

@@ -57,12 +57,15 @@ class StudyConfig(Model):
     """Strategies compared on the same random arenas."""
 
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Arena k and its noise are functions of this seed and of k alone."""
+    """Of arenas and noise. Arena k and its noise are functions of this seed and of k alone."""
     arenas: Annotated[int, pydantic.Field(ge=1, le=100_000_000)] = 600
+    """How many."""
     families: Annotated[tuple[AnyFamily, ...], pydantic.Field(min_length=1)] = FAMILIES
-    """They take turns: arena k is of family k modulo their number. Built in are obstacles, bump, stairs, gate, mixed,
-    clutter and traffic; a scene file (.toml) is a family with one arena; package.module:name is your own generator."""
+    """Of arenas: obstacles, bump, stairs, gate, mixed, clutter (these by default), traffic, a scene (.toml), or
+    package.module:name, a generator of your own. They take turns: arena k is of family k modulo their number. A
+    scene file is a family with one arena."""
     strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
+    """Those that are compared, by default all below."""
     metrics: tuple[MetricName, ...] = METRICS
     """Columns beside those that all rows have: path efficiency (spl), the least distance from boxes (clearance), plans
     but the first (replans), the share of time spent measuring; or your own, as package.module:name."""

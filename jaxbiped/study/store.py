@@ -16,7 +16,7 @@ import re
 import time
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import polars as pl
 
@@ -29,6 +29,13 @@ from jaxbiped.study.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
 from jaxbiped.terminal import command_line
 
 POINTS, ROWS = "points.parquet", "rows"
+
+
+class StoredRows(NamedTuple):
+    """What a results folder holds: `read(folder).rows`, or `rows, manifest = read(folder)`."""
+
+    rows: pl.DataFrame  # of `schema.SCHEMA`, sorted by sweep point, arena and strategy
+    manifest: Manifest
 
 
 class Store:
@@ -195,11 +202,12 @@ def refuse_filled(folder: Path) -> None:
         raise InputError("exists and is not empty; a results folder must be new or empty", file=folder)
 
 
-def read(folder: str | Path) -> tuple[pl.DataFrame, Manifest]:
-    """All rows, sorted by sweep point, arena and strategy, and the manifest.
+def read(folder: str | Path) -> StoredRows:
+    """The rows of a folder and its manifest. One whose study is not finished reads as the rows that it has;
+    `Manifest.state` tells.
 
-    Raises `InputError` about what is missing or broken, by name. A folder whose study is not finished reads as the
-    rows that it has; `Manifest.state` tells.
+    Raises:
+      InputError: what is missing or broken, by name.
     """
     manifest = read_manifest(folder)
     frames = []
@@ -213,7 +221,7 @@ def read(folder: str | Path) -> tuple[pl.DataFrame, Manifest]:
     check_complete(folder, manifest, sum(len(frame) for frame in frames))
     frame = pl.concat(frames, how="diagonal") if frames else pl.DataFrame(schema=SCHEMA)
     strategy = pl.col("strategy").cast(pl.Enum(ordered(frame["strategy"].unique())))
-    return validate(frame, file=folder).sort("point", "arena", strategy), manifest
+    return StoredRows(validate(frame, file=folder).sort("point", "arena", strategy), manifest)
 
 
 def scan(folder: str | Path) -> pl.LazyFrame:

@@ -24,15 +24,16 @@ class TuneConfig(Model):
     """
 
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Of arenas, noise, perturbations and intervals."""
+    """Of arenas and all noise, perturbations and intervals."""
     arenas: Positive = 1024
-    """Training arenas: numbers 100,000,000 and up, which no study compares on."""
+    """Training arenas. Their numbers are 100,000,000 and up, which no study compares on."""
     test_arenas: Positive = 2048
-    """Test arenas: numbers 0 and up, those of `jaxbiped compare` with this seed."""
+    """Test arenas. Their numbers are 0 and up, those of `jaxbiped compare` with this seed."""
     families: Annotated[tuple[Family, ...], pydantic.Field(min_length=1)] = FAMILIES
-    """They take turns: arena k is of family k modulo their number."""
+    """Of arenas: obstacles, bump, stairs, gate, mixed, clutter (these by default) or traffic. They take turns: arena k
+    is of family k modulo their number."""
     strategy: Plans = "full"
-    """Whose missions; the way of `blind_stop` does not depend on costs."""
+    """Whose missions: full, bump_aware, gate_aware or floor_only. The way of `blind_stop` does not depend on costs."""
     steps: Positive = 32
     """Steps of the descent."""
     batch: Positive = 32

@@ -15,13 +15,13 @@ from rich.progress import track
 from rich.table import Table
 
 from jaxbiped import cli
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 from jaxbiped.files import new_folder, write_whole
 
 LINES = 3000  # more than a pipe holds
 
 
-class PretendArgs(Model):
+class PretendArgs(Options):
     """Store a folder, and print about it."""
 
     out: Path = Path("out")

@@ -61,7 +61,8 @@ def test_who_sways_keeps_further_off_by_default(scene, monkeypatch):
         assert cli.main(["run", scene, *options]) == 0
     assert seen == [0.10, SWAYING, 0.11]
     assert MissionConfig(executor="mjx", robot={"standing": 0.39}).robot.radius == SWAYING
-    assert MissionConfig(executor="native", robot=RobotConfig()).robot.radius == RobotConfig().radius
+    assert MissionConfig(executor="mjx", robot=RobotConfig(standing=0.39)).robot.radius == SWAYING
+    assert MissionConfig(executor="native", robot=RobotConfig(radius=0.10)).robot.radius == 0.10
 
 
 def missing(package):

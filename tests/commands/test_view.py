@@ -1,6 +1,7 @@
 """`jaxbiped view`: it serves what there is to be shown, and names in one line what it cannot show."""
 
 import re
+import subprocess
 import sys
 import urllib.request
 
@@ -48,6 +49,16 @@ def test_it_serves_while_it_waits(result, capsys, monkeypatch):
     assert url == same and url.startswith("http://127.0.0.1:") and status == 200
     with pytest.raises(OSError):
         urllib.request.urlopen(url, timeout=5)
+
+
+def test_the_address_reaches_a_pipe_while_it_waits(result):
+    command = [sys.executable, "-m", "jaxbiped", "view", str(result), "--port", "0", "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline().startswith("a_scene, full")
+            assert process.stdout.readline().startswith("http://127.0.0.1:")
+        finally:
+            process.terminate()
 
 
 def test_it_says_what_it_shows_and_where(result, capsys):

@@ -27,6 +27,7 @@ def whole(moments=4):
         outlines=(replace(first, top=0.03, way=(0.3, -0.1, 0.02, 0.5)), *others),
         true_z=np.linspace(0, 0.03, moments),
         squat=np.arange(moments) % 2 == 1,
+        seen=np.arange(moments) % 3,
         points=tuple(RNG.uniform(-1, 2, (n, 3)).astype(np.float32) for n in (7, 0, 300, 1)[:moments]),
         voxels=RNG.random((moments, 7, 9, 15)) < 0.1,
         walk=Walk(RNG.normal(size=(11, 19)).astype(np.float32), np.linspace(0, 2.9, 11, dtype=np.float32)),

@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from jaxbiped.report.folder_report import write_report
 from jaxbiped.report.grid import parsed, to_grid, typeset
 from jaxbiped.report.plots import attributed, attribution_sheet
-from jaxbiped.report.summary import write_report
 from jaxbiped.report.tables import Sheet
 from jaxbiped.study import create
 from tests.report.html_reader import Reader
@@ -66,7 +66,7 @@ def test_it_says_what_was_asked_answered_and_done(read):
 
 
 def test_tables_are_complete(read):
-    assert len(read.tables) == 8
+    assert len(read.tables) == 9
     for table in read.tables:
         widths = {sum(span for span, _ in row) for row in table}
         assert len(table) > 1 and len(widths) == 1

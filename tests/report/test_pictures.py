@@ -93,6 +93,31 @@ def test_maps_of_any_size_are_drawn(shape, tmp_path):
         assert image.format == "PNG" and min(image.size) > 300
 
 
+def labels(figure):
+    """What the legend of a figure says."""
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_the_legend_of_a_mission_names_all_that_is_drawn():
+    figure = Figure()
+    pictures.mission_legend(figure, log := mission(3))
+    said = labels(figure)
+    assert "obstacle + robot's radius" in said and "reached within 10 cm" in said
+    assert "landmark (circle)" in said and "landmark (square)" in said and "true outline" in said
+    figure = Figure()
+    pictures.mission_legend(figure, replace(log, landmarks=log.landmarks[:1], outlines=()))
+    assert "landmark (circle)" in labels(figure) and not {"landmark (square)", "true outline"} & set(labels(figure))
+
+
+def test_the_legend_of_a_map_that_somebody_brings_claims_no_growing(tmp_path, monkeypatch):
+    grid, kept = ClassGrid(np.ones((3, 4), np.int8), np.zeros((3, 4), np.int8), np.zeros(2), 0.05), []
+    monkeypatch.setattr(pictures, "save_figure", lambda figure, _: kept.append(figure))
+    pictures.save_map(tmp_path / "a.png", grid, goal_xy=(0.1, 0.1), goal_radius=None)
+    pictures.save_map(tmp_path / "a.png", grid, goal_xy=(0.1, 0.1))
+    assert "obstacle" in labels(kept[0]) and not any("reached" in said for said in labels(kept[0]))
+    assert "reached within 10 cm" in labels(kept[1])
+
+
 @pytest.mark.parametrize("moments", [1, 2, 3, 5])
 def test_a_mission_picture_is_written(moments, tmp_path):
     pictures.save_mission(tmp_path / "m.png", mission(moments), title="a mission")

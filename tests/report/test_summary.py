@@ -6,7 +6,8 @@ import pytest
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.report.summary import QUESTION_TEXT, write_report
+from jaxbiped.report.folder_report import write_report
+from jaxbiped.report.summary import QUESTION_TEXT
 from jaxbiped.study import create, store
 from tests.study.synthetic import rows
 
@@ -45,7 +46,7 @@ def test_again_is_the_same_and_the_rows_stay(tmp_path):
     second = write_report(folder, resamples=100)
     assert second.comparison == first.comparison
     assert {path: path.read_bytes() for path in second.files} == before
-    assert store.read(folder)[0].height == 300
+    assert store.read(folder).rows.height == 300
 
 
 def test_an_unfinished_study_says_so(tmp_path):

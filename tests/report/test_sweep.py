@@ -71,7 +71,7 @@ def test_summary_says_what_the_rows_hold(tmp_path):
     text = (folder / "summary.md").read_text()
     assert "**Is C3 right?**" in text and "![" in text and "config hash" in text.lower()
     assert report.result.reference == 2  # C3 = 10, the paper's
-    frame = store.read(folder)[0]
+    frame = store.read(folder).rows
     for point in report.result.points:
         reached = frame.filter((pl.col("point") == point.index) & (pl.col("strategy") == PAIR[0]))["success"].mean()
         line = next(row for row in text.splitlines() if row.startswith(f"| {point.index} |"))

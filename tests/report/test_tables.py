@@ -57,7 +57,7 @@ def test_the_question_is_the_first_pair():
 
 def test_markdown_rows_have_all_columns():
     sheets = markdown_sheets(COMPARISON)
-    assert len(sheets) == 3 + 2 * (1 + 5)
+    assert len(sheets) == 4 + 2 * (1 + 5)
     for sheet in sheets:
         lines = [line for line in to_markdown(sheet).splitlines() if line.startswith("|")]
         assert {line.count("|") for line in lines} == {len(sheet.columns) + 1}

@@ -48,6 +48,21 @@ def test_a_summary_is_the_count():
     assert summary.success_of_reachable.estimate == pytest.approx(reachable["success"].mean())
 
 
+def test_a_strategys_own_means_have_intervals_over_all_arenas():
+    frame = rows(90, strategies=("full", "floor_only"))
+    found = compare(frame, seed=5, resamples=200)
+    again = compare(frame, seed=5, resamples=200)
+    for name in ("full", "floor_only"):
+        reached = frame.filter((pl.col("strategy") == name) & pl.col("success"))
+        for metric in ("distance", "time"):
+            mean = getattr(found.summary(name), metric)
+            assert mean == getattr(again.summary(name), metric) and mean.n == len(reached)
+            assert mean.low < mean.estimate < mean.high and mean.estimate == pytest.approx(reached[metric].mean())
+            error = reached[metric].std() / np.sqrt(len(reached))  # the interval is about as wide as the t interval
+            assert mean.high - mean.low == pytest.approx(2 * 1.98 * error, rel=0.25)
+    assert found.summary("full", found.strata("family")[0]).time.low is None
+
+
 def test_strata_split_the_arenas():
     assert COMPARISON.strata("all") == (ALL,)
     assert len(COMPARISON.strata("family")) == 6

@@ -41,7 +41,8 @@ def stored(folder, *, seed=0, arenas=60, points=1, strategies=("full", "bump_awa
 
 def other(frame: pl.DataFrame, point: int) -> pl.DataFrame:
     """The same arenas, everything slower."""
-    return frame.with_columns(pl.lit(point, pl.Int32).alias("point"), pl.col("time") + 30.0 * point)
+    slower = [pl.col(name) + 30.0 * point for name in ("time", "elapsed")]
+    return frame.with_columns(pl.lit(point, pl.Int32).alias("point"), *slower)
 
 
 def test_two_strategies_are_what_compare_says_of_them(tmp_path):

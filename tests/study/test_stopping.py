@@ -6,8 +6,8 @@ import polars as pl
 import pytest
 
 from jaxbiped.errors import InputError
+from jaxbiped.report.folder_report import write_report
 from jaxbiped.report.stopping import stopping_sentences
-from jaxbiped.report.summary import write_report
 from jaxbiped.study import store
 from jaxbiped.study.conduct import conduct
 from jaxbiped.study.config import StudyConfig

@@ -43,6 +43,14 @@ def finished(tmp_path):
     return tmp_path / "r"
 
 
+def test_what_is_read_has_names(finished):
+    found = store.read(finished)
+    rows, manifest = found
+    assert found.rows is rows and found.manifest is manifest
+    with pytest.raises(AttributeError):
+        found.rows = None
+
+
 def test_what_is_written_is_read(finished):
     frame, manifest = store.read(finished)
     assert frame.equals(FRAME.sort("arena", maintain_order=True))

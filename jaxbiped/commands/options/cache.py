@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 
 
-class CacheArgs(Model):
+class CacheArgs(Options):
     """Show what is kept on disk so that programs start sooner: machine code of kernels, and XLA's executables.
 
     It lies in the user's cache folder, or where JAXBIPED_CACHE says; JAXBIPED_CACHE=off keeps nothing.

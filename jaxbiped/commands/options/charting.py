@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from pydantic import Field
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import RobotFileOptions
 from jaxbiped.mapping.config import SCAN, ChartConfig
 from jaxbiped.motion.config import RobotConfig
 
@@ -17,7 +17,7 @@ Area = Annotated[tuple[float, float, float, float] | None, tyro.conf.arg(metavar
 Folder = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
 
 
-class ChartArgs(Model):
+class ChartArgs(RobotFileOptions):
     """Options of both commands."""
 
     pitch: float = Field(0.05, ge=0.005, le=10.0)

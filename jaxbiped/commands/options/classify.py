@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import tyro
 from pydantic import Field
@@ -16,6 +16,10 @@ Vector = Annotated[tuple[float, float, float] | None, tyro.conf.arg(metavar="X Y
 
 class ClassifyArgs(ChartArgs):
     """Map a point cloud or, with --heightmap, an elevation map: class grid and levels, with pictures."""
+
+    BASIC: ClassVar[tuple[str, ...]] = (
+        *("cloud", "heightmap", "cell", "range", "scale", "up", "floor", "pitch", "area", "robot_file", "out"),
+    )
 
     cloud: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="FILE")]
     """The cloud, .npz (points [N, 3], or x, y, z), .npy, .ply or .pcd. The elevation map, .npz (heights [P, Q] and

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import pydantic
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 
 
-class EngineArgs(Model):
+class EngineArgs(Options):
     """Options of `engine`."""
 
     scheduler: str | None = None

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import pydantic
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 
 
-class FitSensorArgs(Model):
+class FitSensorArgs(Options):
     """Render arenas, watch the matcher and the landmarks, fit the noise of the ray-cast sensor to what is seen, and
     say how close the two sensors come on other arenas. The file that is written goes with --preset."""
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 from pydantic import Field
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 from jaxbiped.mission.config import CostConfig
 
 Cost = Annotated[float, Field(ge=0.0, le=1e6)]
@@ -17,7 +17,7 @@ PAPER = CostConfig()
 Name = Annotated[Path | None, tyro.conf.arg(metavar="PATH")]
 
 
-class PlanArgs(Model):
+class PlanArgs(Options):
     """Plan a path on a map: Moving AI .map, a PNG or PGM with its ROS map_server YAML, or a class grid .npz."""
 
     file: tyro.conf.Positional[Path]

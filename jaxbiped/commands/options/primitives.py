@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import pydantic
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 from jaxbiped.motion.catalogue import PAPER, Pace
 from jaxbiped.motion.config import Goal
 
 Name = Literal[tuple(PAPER)]
 
 
-class PrimitivesArgs(Model):
+class PrimitivesArgs(Options):
     """Generate the motion primitives and verify them in simulation: undisturbed, on a mild and a hard set of
     disturbances, and with each disturbance by itself. Write tables, the library that `--executor sampled` reads, and
     videos.
     """
+
+    BASIC: ClassVar[tuple[str, ...]] = (*("pace", "optimise", "only", "draws", "seed", "robot", "videos", "out"),)
 
     pace: Pace = "paper"
     """Table 2's durations, or as fast as servos and balance safely allow (as missions in simulation play them)."""

@@ -8,10 +8,10 @@ from typing import Annotated
 import pydantic
 import tyro
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 
 
-class ReportArgs(Model):
+class ReportArgs(Options):
     """Write report.html, summary.md and the figures of a results folder anew, and print its tables."""
 
     folder: tyro.conf.Positional[Path]

@@ -7,10 +7,10 @@ from typing import Annotated, Literal
 
 import pydantic
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
 
 
-class ReproduceArgs(Model):
+class ReproduceArgs(RobotFileOptions, CameraFileOptions):
     """Repeat the paper's experiments and write one page: its Tables 1 to 4 with our figures beside the paper's, the
     reasons where they differ, pictures after its figures, and the population behind its example.
     """
@@ -25,6 +25,9 @@ class ReproduceArgs(Model):
     """What the missions of the scenes see with."""
     executor: Literal["native", "mjx", "sampled", "kinematic"] = "native"
     """How they move."""
+    preset: Annotated[str, pydantic.Field(exclude=True)] = "rendered"
+    """How well the camera of these missions measures: ideal, rendered, real, or a sensor file (.toml). As --robot and
+    --camera it is about the missions of the scenes alone; the paper's are the default."""
     draws: Annotated[int, pydantic.Field(ge=0, le=100_000)] = 32
     """Trials of each primitive for Table 2; 0: none."""
     population: Annotated[int, pydantic.Field(ge=0, le=1_000_000)] = 1000

@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import pydantic
 import tyro
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
+from jaxbiped.commands.options.strategies import strategy_notes
 from jaxbiped.mission.config import MissionConfig
 from jaxbiped.study.config import StrategyName
 
 
-class RunArgs(Model):
+class RunArgs(RobotFileOptions, CameraFileOptions):
     """Run one mission in a scene: print what the robot plays, and write pictures of its map."""
+
+    BASIC: ClassVar[tuple[str, ...]] = (
+        *("scene", "strategy", "seed", "mission.sensor", "mission.preset", "mission.executor"),
+        *("mission.planner", "robot_file", "camera_file", "out"),
+    )
+    NOTES: ClassVar[str] = strategy_notes()
 
     scene: tyro.conf.Positional[Path]
     """The scene, a TOML file; the paper's six are in configs/scenes."""
     strategy: StrategyName = "full"
-    """What the robot dares: full, bump_aware (no gates), gate_aware (no bumps), floor_only, or blind_stop, which walks
-    straight ahead; or package.module:name of your own."""
+    """What the robot plans its way by, and what it dares."""
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
     """Of all noise."""
     out: Path | None = None

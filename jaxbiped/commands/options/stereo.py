@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import tyro
 from pydantic import Field
@@ -15,6 +15,10 @@ from jaxbiped.sensing.stereo.config import MatchParams
 
 class StereoArgs(ChartArgs):
     """Map what a stereo pair shows: points, 3D grid and class grid, with pictures."""
+
+    BASIC: ClassVar[tuple[str, ...]] = (
+        *("left", "right", "camera", "max_range", "num_disparities", "pitch", "area", "robot_file", "out"),
+    )
 
     left: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LEFT")]
     """The picture of the left camera: PNG, JPEG, TIFF, PGM, ...; grey or colour, 8 or 16 bits."""

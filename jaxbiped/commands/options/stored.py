@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import pydantic
 import tyro
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 
 Share = Annotated[float, pydantic.Field(gt=0.0, lt=1.0)]
 Amount = Annotated[float, pydantic.Field(gt=0.0)]
 
 
-class StoredArgs(Model):
+class StoredArgs(Options):
     """Compare two strategies or sweep points of stored results, on the same arenas, without running again."""
+
+    BASIC: ClassVar[tuple[str, ...]] = (
+        *("folders", "first", "second", "first_point", "second_point"),
+        *("margin_success", "plan_power", "wanted_difference", "out"),
+    )
 
     folders: tyro.conf.Positional[Annotated[tuple[Path, ...], pydantic.Field(min_length=1, max_length=2)]]
     """One results folder, or two on the same arenas: the first side is then of the first."""

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
 
+from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
 from jaxbiped.commands.options.engine import EngineArgs
+from jaxbiped.commands.options.strategies import strategy_notes
 from jaxbiped.study.sweep import SweepConfig
 
 
-class SweepArgs(EngineArgs, SweepConfig):
+class SweepArgs(EngineArgs, RobotFileOptions, CameraFileOptions, SweepConfig):
     """Sweep numbers of the config: missions on the same random arenas at each point, tables and figures.
 
     The sweep in TOML comes first, such as sweeps/costs.toml; options on the command line override it.
     """
 
+    BASIC: ClassVar[tuple[str, ...]] = (
+        *("seed", "arenas", "families", "strategies", "mission.sensor", "mission.preset", "mission.executor"),
+        *("robot_file", "camera_file", "resume", "out"),
+    )
+    NOTES: ClassVar[str] = strategy_notes()
+
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/sweep-<hash of the sweep>."""
     resume: bool = False
-    """Go on with the same sweep in the folder, where it was stopped; or begin it."""
+    """Go on with the sweep in the folder where it was stopped, or begin it."""

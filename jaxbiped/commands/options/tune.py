@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
+from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
+from jaxbiped.commands.options.strategies import strategy_notes
+from jaxbiped.study.names import STRATEGIES
 from jaxbiped.study.tuning_config import TuneConfig
 
 
-class TuneArgs(TuneConfig):
+class TuneArgs(RobotFileOptions, CameraFileOptions, TuneConfig):
     """Tune the costs C1 to C4 on random arenas, and judge them on others.
 
     The planner takes the same paths when all costs double, so that C0 stays as it is. A TOML file may come first and
     give the defaults.
     """
 
+    BASIC: ClassVar[tuple[str, ...]] = (
+        *("seed", "arenas", "test_arenas", "families", "strategy", "from_durations"),
+        *("mission.sensor", "mission.preset", "mission.executor"),
+        *("robot_file", "camera_file", "out"),
+    )
+    NOTES: ClassVar[str] = strategy_notes(tuple(name for name in STRATEGIES if name != "blind_stop"), own=False)
+
     from_durations: Literal["table", "library"] | None = None
-    """Play no mission, and fit C0 to C3 to how long the primitives take: those of `durations` (Table 2 of the paper by
-    default), or those that simulation measured (`library`)."""
+    """Play no mission, and fit C0 to C3 to how long the primitives take: `table` for `durations`, by default Table 2 of
+    the paper, `library` for what simulation measured."""
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/tune-<hash of the config>."""

@@ -8,10 +8,10 @@ from typing import Annotated
 import pydantic
 import tyro
 
-from jaxbiped.config import Model
+from jaxbiped.commands.options.base import Options
 
 
-class ViewArgs(Model):
+class ViewArgs(Options):
     """Show missions in the browser: arena, robot, points, maps, plan and pictures, at any time of them."""
 
     result: tyro.conf.Positional[Path]

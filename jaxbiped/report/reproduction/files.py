@@ -44,9 +44,11 @@ def write(out: Path, found: Findings, args: dict[str, Any], facts: dict[str, str
             each.both.write_parquet(buffer)
             write_whole(folder / f"saved_{each.executor}.parquet", saver(buffer.getvalue()))
         pictures = save_pictures(folder, found)
+        config = found.config.model_dump(mode="json")
         for item in EXPERIMENTS:
             (folder / item.scene).mkdir()
-            save_log(folder / item.scene / FILE, found.logs[item.number], {"scene": item.scene, "args": args})
+            facts_of_one = {"scene": item.scene, "args": args, "config": config}
+            save_log(folder / item.scene / FILE, found.logs[item.number], facts_of_one)
     others = [f"saved_{each.executor}.parquet" for each in found.populations]
     return [*texts, MISSIONS, *others, *pictures, f"{EXPERIMENTS[0].scene} to {EXPERIMENTS[-1].number}"]
 

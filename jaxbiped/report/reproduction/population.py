@@ -16,7 +16,7 @@ from jaxbiped.report.plots import WIDTH, Plot
 from jaxbiped.report.style import own_style
 from jaxbiped.report.svg import INK, inline, themed
 from jaxbiped.report.sweep_figures import BETTER_UP, Panel, fill_map
-from jaxbiped.report.tables import Sheet, code_sheet, pair_sheet, strategy_sheet
+from jaxbiped.report.tables import Sheet, code_sheet, pair_sheet, strategy_sheets
 from jaxbiped.report.words import signed
 from jaxbiped.study.intervals import mean_and_median
 from jaxbiped.study.reproduction.paper import SAVED
@@ -36,7 +36,7 @@ def population_section(population: Population, measure: float) -> Section:
     name = f"{population.arenas:,} random bumps, executor {population.executor}, sensor {population.sensor}"
     plots = () if population.both.is_empty() else drawn(population, measure)
     comparison = population.comparison
-    sheets = [strategy_sheet(comparison), pair_sheet(comparison), code_sheet(comparison)]
+    sheets = [*strategy_sheets(comparison), pair_sheet(comparison), code_sheet(comparison)]
     return Section(name, tuple(sentences(population, measure)), plots, tuple(to_grid(each) for each in sheets))
 
 

@@ -1,0 +1,20 @@
+"""What is said of strategies below the options of commands that take them."""
+
+from __future__ import annotations
+
+from jaxbiped.study.names import STRATEGIES
+
+DARES = {
+    "full": "steps over bumps and passes gates",
+    "bump_aware": "steps over bumps; gates are obstacles to it",
+    "gate_aware": "passes gates; bumps are obstacles to it",
+    "floor_only": "goes round bumps and gates",
+    "blind_stop": "walks straight to the goal and stops at whatever is no floor",
+}
+OWN = "or your own: package.module:name, or a name that a package registered"
+
+
+def strategy_notes(names: tuple[str, ...] = STRATEGIES, own: bool = True) -> str:
+    """A line for each strategy that is built in and, with `own`, one for all others."""
+    lines = [f"  {name:<10}  {DARES[name]}" for name in names]
+    return "\n".join(["Strategies:", *lines, *([f"  {OWN}"] if own else [])])

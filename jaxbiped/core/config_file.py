@@ -1,0 +1,55 @@
+"""Parts of a config that may lie in a TOML file of their own, such as a robot or a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pydantic
+
+from jaxbiped.config import Model, input_error, load_toml, told
+from jaxbiped.errors import InputError
+
+FILE = "file"  # key of a table that names one
+
+
+class FileModel(Model):
+    """A model that a TOML file of its own may give: `"robot.toml"` in its place, or a table with the key `file`.
+
+    What the table gives besides wins over the file. The rule is the same for the command line, TOML and Python.
+    """
+
+    @pydantic.model_validator(mode="before")
+    @classmethod
+    def _from_file(cls, data: Any) -> Any:
+        try:
+            return with_file(cls, data)
+        except InputError as error:
+            told(str(error))
+
+
+def with_file(model: type[Model], data: Any) -> Any:
+    """The fields of a model as they are given, those of a file that is named among them.
+
+    Args:
+      data: of the model; what names no file is returned as it is.
+
+    Raises:
+      InputError: a file that is missing, no TOML, or gives a field that is wrong.
+    """
+    given = {FILE: data} if isinstance(data, str | Path) else data
+    if not isinstance(given, Mapping) or FILE not in given:
+        return data
+    path = given[FILE]
+    if not isinstance(path, str | Path):
+        raise InputError("must be a TOML file", field=FILE, value=path)
+    table = load_toml(path)
+    if FILE in table:
+        raise InputError("unknown key", file=path, field=FILE)
+    try:
+        model.model_validate(table)
+    except pydantic.ValidationError as error:
+        if error.errors()[0]["loc"]:  # else it is about several fields, and some may be given besides
+            raise input_error(error, file=path) from None
+    return table | {name: value for name, value in given.items() if name != FILE}
