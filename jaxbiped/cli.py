@@ -186,7 +186,7 @@ def one_line(box: str, name: str, rest: Sequence[str] = ()) -> InputError:
     rows = itertools.dropwhile(is_rule, rows[1:])
     message = " ".join(itertools.takewhile(lambda row: not is_rule(row), rows))
     message = re.sub(r"\[/?bold\]", "", message)
-    listed = f"`jaxbiped {name} --help` lists what {name} takes"
+    listed = f"`jaxbiped {name} --help-all` lists what {name} takes"
     if found := re.match(r"Unrecognized options: (.*)", message):
         words = found[1].split(", ")
         if not words[0].startswith("-"):

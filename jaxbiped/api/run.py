@@ -132,12 +132,13 @@ class PlayedMission:
         Raises:
           InputError: a folder that exists or cannot be written.
         """
+        from jaxbiped.mission.pose_error import pose_facts
         from jaxbiped.mission.recording import FILE, save_log
         from jaxbiped.report.animation import save_gif
         from jaxbiped.report.pictures import save_mission
 
         facts = {"scene": self.name, "strategy": self.strategy, "code": self.code, "distance": self.distance}
-        facts |= {"time": self.time, "measurements": self.mission.measurements}
+        facts |= {"time": self.time, "measurements": self.mission.measurements} | pose_facts(self.log)
         with new_folder(Path(folder)) as new:
             save_mission(new / "map.png", self.log, title=str(self))
             save_gif(new / "mission.gif", self.log, title=f"{self.name}, {self.strategy}")

@@ -11,6 +11,7 @@ from jaxbiped.commands import compare, run
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.sensing.presets import PRESETS
+from jaxbiped.study.names import METRICS
 from jaxbiped.study.schema import SCHEMA
 
 SCENE = "configs/scenes/experiment_5.toml"
@@ -36,9 +37,9 @@ def refused(capsys, *argv: str) -> str:
     ("argv", "said"),
     [
         (["walk"], ["must be one of " + ", ".join(cli.COMMANDS), "walk"]),
-        (["run"], ["PATH: must be given; `jaxbiped run --help` lists"]),
+        (["run"], ["PATH: must be given; `jaxbiped run --help-all` lists"]),
         (["run", SCENE, "--strateg", "full"], ["--strateg: is no option of jaxbiped run; did you mean --strategy?"]),
-        (["run", SCENE, "again", "3"], ["again: is one word too many; `jaxbiped run --help` lists"]),
+        (["run", SCENE, "again", "3"], ["again: is one word too many; `jaxbiped run --help-all` lists"]),
         (
             ["run", SCENE, "--executor", "feet"],
             ["--executor: must be one of kinematic, sampled, native, mjx, or package.module:name", "(got 'feet')"],
@@ -49,7 +50,7 @@ def refused(capsys, *argv: str) -> str:
         (["classify", "a.ply", "--up", "0", "0"], ["--up: must be 3 numbers (got 0 0)"]),
         (["classify", "a.ply", "--pitch", "nan"], ["--pitch: must be a finite number (got nan)"]),
         (["compare", "--families"], ["--families: must have at least 1 item (got ())"]),
-        (["sweep", "--no-such"], ["options: cannot be used; `jaxbiped sweep --help` lists", "--no-such"]),
+        (["sweep", "--no-such"], ["options: cannot be used; `jaxbiped sweep --help-all` lists", "--no-such"]),
         (["run", SCENE, "--speed", "3"], ["--speed: is no option of jaxbiped run; did you mean --seed?"]),
         (["run", SCENE, "--strategy", "brave"], ["--strategy", "brave", "floor_only"]),
         (["run", SCENE, "--costs.c1", "-4"], ["--costs.c1", "greater than or equal to 0", "-4"]),
@@ -213,7 +214,7 @@ def test_compare_writes_its_folder_and_report_reads_it(here, capsys):
     argv = ["compare", "--arenas", "24", "--strategies", "full", "floor_only", "--out", "mine"]
     assert cli.main(argv) == 0
     rows = pl.read_parquet(here / "mine" / "rows")
-    assert rows.schema == SCHEMA and len(rows) == 48
+    assert rows.schema == {**SCHEMA, **dict.fromkeys(METRICS, pl.Float64)} and len(rows) == 48
     manifest = json.loads((here / "mine" / "manifest.json").read_text())
     assert manifest["state"] == "finished" and manifest["arenas"] == 24 and "out" not in manifest["config"]
     summary = (here / "mine" / "summary.md").read_text()
