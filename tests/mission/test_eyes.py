@@ -14,6 +14,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.cycle import cycle, sense
 from jaxbiped.mission.eyes import eyes_for, where
 from jaxbiped.mission.queue import stack
+from jaxbiped.mission.sensors import RayCast
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import start
 from jaxbiped.sensing import camera as cameras
@@ -115,7 +116,8 @@ def test_rendered_view_agrees_with_the_ray_cast_one(first_look):
         again, _ = eyes.see(*first_look)
     finally:
         eyes.close()
-    cast, _ = by_ray_cast(*first_look)
+    world, mind, arena, settings = first_look
+    cast, _ = by_ray_cast(world, mind, arena, replace(settings, sensor=RayCast()))
     assert np.array_equal(seen.z, again.z)
     for view in (seen, cast):
         near = (np.asarray(view.weight[0]) > 0) & (np.abs(view.x[0] - 0.35) < 0.05) & (np.abs(view.y[0]) < 0.1)

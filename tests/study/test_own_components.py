@@ -120,11 +120,10 @@ def test_names_that_are_taken_or_cannot_be_shown_are_refused(tmp_path):
     for name in ("bump", "a/b", "", "<i>", "scene (1)"):
         with pytest.raises(InputError, match="name of a family"):
             Family(name, jnp.sin)
-    for stem in ("bump", "scene (1)"):
-        path = tmp_path / f"{stem}.toml"
-        path.write_text("")
-        with pytest.raises(InputError, match=r"\.toml: name of a family"):
-            scene_family(path)
+    path = tmp_path / "scene (1).toml"
+    path.write_text("")
+    with pytest.raises(InputError, match=r"\.toml: name of a family"):
+        scene_family(path)
     FAMILIES.add("hills", Family("hills", jnp.sin), replace=True)
     with pytest.raises(InputError, match="goes with families that are built in only"):
         families_of(StudyConfig(families=("traffic", "hills")))
