@@ -191,10 +191,8 @@ def metric_sheet(comparison: Comparison, first: str, second: str) -> Sheet:
     pair, rows = comparison.pair(first, second), []
     for measure in metric_measures(comparison):
         difference, p = part(pair, measure)
-        own = [
-            scaled(comparison.summary(name).metrics[measure.name].estimate, measure, measure.digits)
-            for name in (first, second)
-        ]
+        means = [comparison.summary(name).metrics[measure.name].estimate for name in (first, second)]
+        own = [number(None if mean is None else mean * measure.scale, measure.digits) for mean in means]
         value = signed(difference.estimate * measure.scale if difference.valid else None, measure.digits)
         limits = brackets(difference, measure.scale, measure.digits)
         rows.append(

@@ -63,13 +63,21 @@ def check_metrics(batch: Arena, group: Group, size: int) -> None:
     Raises:
       InputError: a metric whose result is not one number and one truth value.
     """
-    if group.metrics:
-        arenas = jax.tree.map(lambda leaf: leaf[:size], batch)
-        settings = jax.tree.map(lambda leaf: leaf[:1], group.settings)
-        one = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (arenas, settings))
-        states = jax.eval_shape(lambda arena, setting: begun(setting.metrics, arena, setting), *one)
-        plan = OraclePlan(np.zeros((1, size), bool), *(np.zeros((1, size), np.float32) for _ in range(2)))
-        jax.eval_shape(at_ends, arenas, settings, no_results(1, size, metrics=states), plan)
+    if not group.metrics:
+        return
+    arenas = jax.tree.map(lambda leaf: leaf[:size], batch)
+    settings = jax.tree.map(lambda leaf: leaf[:1], group.settings)
+    kind = jax.tree.structure((arenas, settings)), *(np.shape(leaf) for leaf in jax.tree.leaves((arenas, settings)))
+    if kind in CHECKED:
+        return
+    one = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (arenas, settings))
+    states = jax.eval_shape(lambda arena, setting: begun(setting.metrics, arena, setting), *one)
+    plan = OraclePlan(np.zeros((1, size), bool), *(np.zeros((1, size), np.float32) for _ in range(2)))
+    jax.eval_shape(at_ends, arenas, settings, no_results(1, size, metrics=states), plan)
+    CHECKED.add(kind)
+
+
+CHECKED: set = set()  # structures and shapes that have been looked at
 
 
 @jax.jit
