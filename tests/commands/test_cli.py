@@ -42,7 +42,7 @@ def refused(capsys, *argv: str) -> str:
         (["run", SCENE, "again", "3"], ["again: is one word too many; `jaxbiped run --help-all` lists"]),
         (
             ["run", SCENE, "--executor", "feet"],
-            ["--executor: must be one of kinematic, sampled, native, mjx, or package.module:name", "(got 'feet')"],
+            ["--executor: must be one of kinematic, sampled, native, mjx", "or package.module:name", "(got 'feet')"],
         ),
         (["stereo", "left.png"], ["RIGHT, --camera FILE: must be given"]),
         (["plan", "a.map", "--start", "1"], ["--start: must be 2 numbers (got 1)"]),
