@@ -95,7 +95,7 @@ class Cluster:
         """As `evaluate.evaluate`."""
         groups = groups_of(config, points)
         left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
-        total = sum(shard.count * len(groups[shard.group].population_of) for shard in left)
+        total = sum(groups[shard.group].rows(shard) for shard in left)
         refuse_own(config, groups)
         board, topic = Board(on_progress, total), f"jaxbiped-{uuid.uuid4()}"
         todo = iter(left)
