@@ -177,8 +177,10 @@ class Results:
         with store.create(
             folder, config, seed=self.config["seed"], arenas=self.config["arenas"], points=swept
         ) as results:
-            numbered = self.rows.with_columns(block=pl.col("arena") // self.config["shard"])
-            for block in numbered.partition_by("block", include_key=False, maintain_order=True):
+            numbered = self.rows.with_columns(
+                (pl.col("arena") // self.config["shard"]).alias("_block")
+            )  # no metric's name
+            for block in numbered.partition_by("_block", include_key=False, maintain_order=True):
                 results.append(block)
             results.finish()
         return Path(folder)

@@ -74,6 +74,8 @@ class Study:
       metrics: columns beside those that all rows have: names, or metrics of your own, under the name of their class.
       sensor, executor: in place of the mission's: names, or objects of your own, under the name of their class.
 
+      numbers: of components, in place of those that they have: `{"sensor.reach": 0.5}`.
+
     Raises:
       InputError: a name that is not known, two strategies of one name, a number out of its range.
     """
@@ -85,6 +87,7 @@ class Study:
     metrics: Sequence[str | Metric] = METRICS
     sensor: str | Sensor | None = None
     executor: str | Executor | None = None
+    numbers: Mapping[str, float] = field(default_factory=dict)
     shard: int = 1024  # arenas that are computed, and stored, together
     own: tuple[Strategy, ...] = field(init=False, repr=False)
 
@@ -110,6 +113,7 @@ class Study:
             "metrics": tuple(
                 register(item, replace=True) if isinstance(item, Metric) else item for item in self.metrics
             ),
+            "numbers": dict(self.numbers),
             "population": self.arenas.population.model_dump(),
             "mission": self.mission.model_dump() | self._seen_and_moved(),
             "shard": self.shard,
@@ -136,4 +140,12 @@ class Study:
 
         config = load(StudyConfig, path)
         arenas = RandomArenas(config.families, config.arenas, config.population)
-        return cls(arenas, config.strategies, config.mission, config.seed, config.metrics, config.shard)
+        return cls(
+            arenas=arenas,
+            strategies=config.strategies,
+            mission=config.mission,
+            seed=config.seed,
+            metrics=config.metrics,
+            shard=config.shard,
+            numbers=config.numbers,
+        )

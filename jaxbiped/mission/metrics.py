@@ -31,7 +31,8 @@ class PathEfficiency(Metric):
         """See `Metric`."""
         shortest, walked = end.plan.length, end.result.distance
         reached = end.result.code == Code.REACHED
-        value = shortest / jnp.maximum(jnp.maximum(walked, shortest), 1e-6)
+        longer = jnp.maximum(walked, shortest)
+        value = jnp.where(longer > 0, shortest / jnp.where(longer > 0, longer, 1.0), 1.0)
         return jnp.where(reached, value, 0.0), ~reached | (end.plan.reachable & jnp.isfinite(shortest))
 
 

@@ -107,9 +107,10 @@ def play_again(
         is not built in and not given, or is not the one of the study.
     """
     again = strategy_again(manifest, strategy, own or {})
+    said = manifest.config.get("mission")  # looked at as it is: reading it as a config would import what it names
+    for kind, default, known in ((SENSOR, "raycast", SENSORS), (EXECUTOR, "kinematic", EXECUTORS)):
+        same_component(manifest, kind, str(said.get(kind, default)) if isinstance(said, dict) else default, known)
     config, families, population = mission_of(manifest, point, values)
-    for kind, name, known in ((SENSOR, config.sensor, SENSORS), (EXECUTOR, config.executor, EXECUTORS)):
-        same_component(manifest, kind, name, known)
     populations = None if population == PopulationConfig() else stack([population.traced()])
     families = families_again(manifest, families)
     check_mission(config)

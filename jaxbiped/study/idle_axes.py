@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 import polars as pl
 
+from jaxbiped.study.schema import SCHEMA
+
 SAME = 1e-6  # that numbers of two missions may differ by
 # What a mission came to. Costs of plans are not among it: they change with the costs where the way does not.
 NUMBERS = ("walked", "elapsed", "measurements", "decisions", "goal_distance", "pose_error", "yaw_error")
@@ -39,7 +41,9 @@ def spans_of(frame: pl.DataFrame, points: pl.DataFrame, field: str, together: Se
     """Those of one axis."""
     others = [name for name in points.columns if name not in ("point", field, *together)]
     key = [*others, "arena", "strategy"]
-    table = frame.join(points, on="point").unique([field, *key])  # a point of the config's own values may come twice
+    # Metrics are left out: one may be called as a field that is swept.
+    rows = frame.select(name for name in frame.columns if name in SCHEMA).join(points, on="point")
+    table = rows.unique([field, *key])  # a point of the config's own values may come twice
     sides = {value: rows for (value,), rows in table.partition_by(field, as_dict=True).items()}
     values = sorted(sides)
     same = [is_same(sides[low], sides[high], key) for low, high in itertools.pairwise(values)]

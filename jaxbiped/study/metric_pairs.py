@@ -12,6 +12,7 @@ import polars as pl
 from jaxbiped.study.intervals import NOTHING, Estimate, mean_estimate
 from jaxbiped.study.paired import PairedMetric, holm, improvement, signed_rank
 
+SECOND = "#second"  # after a column of the second side: no name of a column ends so
 DIGITS = 6  # after the point: what agrees within these is a tie; sums of floats in another order differ by less
 
 
@@ -29,11 +30,11 @@ def metric_pairs(
 ) -> dict[str, PairedMetric]:
     """Differences (first minus second) of each column on the arenas where both have a number; medians are left out."""
     columns = ["arena", *names]
-    both = first.select(columns).join(second.select(columns), on="arena", suffix="_second").sort("arena")
+    both = first.select(columns).join(second.select(columns), on="arena", suffix=SECOND).sort("arena")
     found = {}
     for name in names:
-        there = both.drop_nulls([name, f"{name}_second"])
-        differences = np.round(there[name].to_numpy() - there[f"{name}_second"].to_numpy(), DIGITS)
+        there = both.drop_nulls([name, f"{name}{SECOND}"])
+        differences = np.round(there[name].to_numpy() - there[f"{name}{SECOND}"].to_numpy(), DIGITS)
         found[name] = PairedMetric(
             mean=mean_estimate(differences, seed=seed, resamples=resamples, level=level),
             median=NOTHING,

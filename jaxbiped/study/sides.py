@@ -158,7 +158,7 @@ def side_by_side(first: Side, second: Side) -> pl.DataFrame:
     for side, other in ((first, second), (second, first)):
         rows = side.rows.join(other.rows.select("arena"), on="arena", how="semi")
         frames.append(rows.with_columns(strategy=pl.lit(side.name), point=pl.lit(0, pl.Int32)))
-    return pl.concat(frames).sort("arena", maintain_order=True)
+    return pl.concat(frames, how="diagonal").sort("arena", maintain_order=True)  # metrics of one alone: null
 
 
 def compare_sides(

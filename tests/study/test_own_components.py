@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+import jaxbiped as jb
 from jaxbiped.api.results import Results
 from jaxbiped.arenas.source import Family, scene_family
 from jaxbiped.core.component import numbers_of, with_numbers
@@ -18,9 +19,12 @@ from jaxbiped.mission.strategies import Strategy
 from jaxbiped.planning import Costs
 from jaxbiped.planning.host_planner import HostPlanner
 from jaxbiped.planning.planners import GridPlanner, Route, StraightLine, check_route
+from jaxbiped.study.again import play_again
+from jaxbiped.study.comparison import compare
 from jaxbiped.study.conduct import conduct, in_order, shard_rows
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import families_of, group_points, only_point, shards
+from jaxbiped.study.manifest import Manifest
 from jaxbiped.study.store import read_points
 from tests.study.synthetic import rows
 
@@ -137,3 +141,33 @@ def test_routes_that_are_none_and_states_that_change_are_named():
     for state in (None, jnp.zeros((3, 2)), jnp.zeros(3, jnp.int32)):
         with pytest.raises(InputError, match="Lab: a route's state must be as initial_state says"):
             check_route(Route(jnp.zeros((3, 1), jnp.int8), state=state), given, "Lab")
+
+
+@pytest.mark.parametrize("part", ["sensor", "executor"])
+def test_a_folder_of_a_stranger_imports_no_component(part, tmp_path, monkeypatch):
+    """The module that it names would leave a mark."""
+    (tmp_path / "evil.py").write_text(f"open({str(tmp_path / 'mark')!r}, 'w')\nS = 1\n")
+    monkeypatch.chdir(tmp_path)
+    config = StudyConfig(arenas=2).model_dump(mode="json")
+    config["mission"][part] = "evil:S"
+    manifest = Manifest.model_construct(config=config, seed=0)
+    with pytest.raises(InputError, match=f"{part}: is not built in"):
+        play_again(manifest, 0, {}, "full", [0])
+    assert not (tmp_path / "mark").exists()
+
+
+def test_metrics_of_any_name_are_compared_and_stored(tmp_path):
+    frame = rows(8).with_columns(block=pl.lit(1.0), gap=pl.col("walked"), gap_second=pl.col("walked"))
+    named = compare(frame, resamples=99).pairs[0].metrics
+    assert set(named) >= {"block", "gap", "gap_second"} and named["gap"].n == named["gap_second"].n
+    config = StudyConfig(arenas=8, shard=3).model_dump(mode="json")
+    points = pl.DataFrame({"point": [0]}, schema={"point": pl.Int32})
+    Results(frame, points, config).save(tmp_path / "kept")
+    assert {"block", "gap", "gap_second"} <= set(jb.load(tmp_path / "kept").rows.columns)
+
+
+def test_a_study_from_a_file_is_the_one_that_the_command_has(tmp_path):
+    (tmp_path / "s.toml").write_text('arenas = 5\nshard = 3\nstrategies = ["full"]\nmetrics = ["spl"]\n')
+    study = jb.Study.from_toml(tmp_path / "s.toml")
+    assert (study.shard, study.sensor, tuple(study.metrics)) == (3, None, ("spl",))
+    assert study.config().shard == 3 and study.config().metrics == ("spl",)

@@ -117,3 +117,19 @@ def test_other_arenas_are_refused_with_the_difference(tmp_path):
     apart = open_stored(stored(tmp_path / "d", change=lambda frame: frame.with_columns(pl.col("arena") + 1000)))
     with pytest.raises(InputError, match="has no arena that"):
         side_by_side(*choose([folder, apart]))
+
+
+def test_folders_with_other_metrics_are_compared(tmp_path):
+    """One from before there were metrics, one that has some, and one that has them in another order."""
+    half, whole = pl.lit(0.5).alias("spl"), pl.lit(1.0).alias("clearance")
+    changes = {
+        "none": None,
+        "two": lambda f: f.with_columns(half, whole),
+        "turned": lambda f: f.with_columns(whole, half),
+    }
+    folders = {name: open_stored(stored(tmp_path / name, change=change)) for name, change in changes.items()}
+    for first, second, both in (("none", "two", 0), ("two", "turned", 60)):
+        comparison, frame = compare_sides(*choose([folders[first], folders[second]]), resamples=50)
+        pair = comparison.pair(*comparison.question)
+        assert pair.metrics["spl"].n == both and pair.success.n == 60
+        assert {"spl", "clearance"} <= set(frame.columns)
