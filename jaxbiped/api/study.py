@@ -72,7 +72,8 @@ class Study:
       mission: robot, sensor, executor, costs and so on, the same for all strategies.
       seed: of the arenas and of all noise.
       metrics: columns beside those that all rows have: names, or metrics of your own, under the name of their class.
-      sensor, executor: in place of the mission's: names, or objects of your own, under the name of their class.
+      sensor, executor: in place of the mission's: names, or objects of your own, under the name of their class. What
+        depends on them and is not given is filled in: `robot.radius` is 0.125 m for all executors but `kinematic`.
 
       numbers: of components, in place of those that they have: `{"sensor.reach": 0.5}`.
 
@@ -115,7 +116,7 @@ class Study:
             ),
             "numbers": dict(self.numbers),
             "population": self.arenas.population.model_dump(),
-            "mission": self.mission.model_dump() | self._seen_and_moved(),
+            "mission": self._mission(),
             "shard": self.shard,
         }
         if axes is not None:
@@ -125,6 +126,11 @@ class Study:
         except pydantic.ValidationError as error:
             raise input_error(error) from None
         return fingerprinted(config)
+
+    def _mission(self) -> dict[str, Any]:
+        """The mission's config; with another sensor or executor, what depends on these is filled in anew."""
+        own = self._seen_and_moved()
+        return self.mission.model_dump(exclude_unset=True) | own if own else self.mission.model_dump()
 
     def _seen_and_moved(self) -> dict[str, str]:
         """Names of the sensor and the executor, where they are not the mission's."""

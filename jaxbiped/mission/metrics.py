@@ -41,8 +41,8 @@ class PathEfficiency(Metric):
 class LeastClearance(Metric):
     """[m] how near the body came to a box that stood between its raised foot and its head; below 0 where they met.
 
-    Boxes are looked at where they stand at the moment, at a third, two thirds and the end of each step, as the referee
-    does. Terrain does not count. There is none where no such box was.
+    It is looked at a third, two thirds and the end of each step, as the referee does. Terrain does not count. There is
+    none where no such box was, nor in arenas with boxes that move.
     """
 
     unit, scale, digits = "cm", 100.0, 1
@@ -66,7 +66,7 @@ class LeastClearance(Metric):
 
     def result(self, state: Float[Array, ""], end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
         """See `Metric`."""
-        return state, jnp.isfinite(state)
+        return state, jnp.isfinite(state) & (end.arena.movers is None)
 
 
 @jax.tree_util.register_dataclass

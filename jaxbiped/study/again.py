@@ -27,6 +27,7 @@ from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.arena_kinds import kinds_of
 from jaxbiped.study.comparison import paired
 from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
+from jaxbiped.study.config import OF_COMPONENTS
 from jaxbiped.study.evaluate import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
 from jaxbiped.study.runner import check_mission, play_one, seeing
@@ -111,6 +112,7 @@ def play_again(
     for kind, default, known in ((SENSOR, "raycast", SENSORS), (EXECUTOR, "kinematic", EXECUTORS)):
         same_component(manifest, kind, str(said.get(kind, default)) if isinstance(said, dict) else default, known)
     config, families, population = mission_of(manifest, point, values)
+    numbers = manifest.config.get("numbers", {}) | {k: v for k, v in values.items() if k.startswith(OF_COMPONENTS)}
     populations = None if population == PopulationConfig() else stack([population.traced()])
     families = families_again(manifest, families)
     check_mission(config)
@@ -122,7 +124,7 @@ def play_again(
                 batch, seeds = draw(key, jnp.asarray(mine), kind.families, populations, jnp.asarray(kind.turns(mine)))
                 for row, k in enumerate(mine):
                     arena = jax.tree.map(lambda leaf, row=row: leaf[row], batch)
-                    played[int(k)] = play_one(arena, config, again, seeds[row], eyes=eyes)
+                    played[int(k)] = play_one(arena, config, again, seeds[row], eyes=eyes, numbers=numbers)
     return [played[int(k)] for k in arenas]
 
 

@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 from jaxtyping import Array, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.component import traced_component, with_numbers
 from jaxbiped.mission.eyes import Eyes, eyes_for
 from jaxbiped.mission.program_for import program_for
 from jaxbiped.mission.queue import Result
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.stepped import Mission, Played, run_logged
-from jaxbiped.mission.strategies import Strategy
-from jaxbiped.study.groups import Group
+from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.study.groups import Group, numbers_under
 
 
 def program_of(config: MissionConfig, arena: Arena) -> Program:
@@ -53,22 +55,37 @@ def play_one(
     noise: UInt32[Array, ""],
     on_decision: Callable[[Played], None] = lambda _: None,
     eyes: Eyes | None = None,
+    numbers: Mapping[str, float] | None = None,
 ) -> Mission:
     """One mission, with a log of everything, as a study would play it.
 
     Args:
       noise: seed of all its noise.
       eyes: of `seeing`, where the sensor measures on the host.
+      numbers: of components, in place of their own, as `{"planner.clearance": 0.1}`.
 
     Raises:
       InputError: a pitch that does not divide the arena, a biped that cannot be simulated.
     """
-    arguments = arena, config.settings(strategy), noise, program_of(config, arena)
+    settings = numbered(config.settings(strategy), strategy, numbers or {})
+    arguments = arena, settings, noise, program_of(config, arena)
     if config.executor in SIMULATED:
         from jaxbiped.mission.walking import walk_logged  # loads MuJoCo
 
         return walk_logged(*arguments, config=config.walk, on_decision=on_decision, eyes=eyes)
     return run_logged(*arguments, on_decision=on_decision, eyes=eyes)
+
+
+def numbered(settings: Settings, strategy: str | Strategy, numbers: Mapping[str, float]) -> Settings:
+    """Settings of a strategy with other numbers of its components."""
+    strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
+    changed = {"sensor": settings.sensor, "executor": settings.executor, "planner": strategy.planner}
+    for name, component in changed.items():
+        own = numbers_under(name, numbers)
+        if component is not None and own:
+            made = traced_component(with_numbers(component, own))
+            settings = replace(settings, **{name: made})
+    return settings
 
 
 @contextlib.contextmanager

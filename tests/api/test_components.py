@@ -64,6 +64,7 @@ def swept():
     study = jb.Study(
         jb.RandomArenas(count=12),
         ["full"],
+        jb.MissionConfig(robot={"radius": 0.1}),  # by default 0.125 for any executor but `kinematic`
         seed=5,
         metrics=["clearance", "spl", TurnedAngle(), Hopeless()],
         sensor=ShortSighted(),

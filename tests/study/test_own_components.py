@@ -25,6 +25,7 @@ from jaxbiped.study.conduct import conduct, in_order, shard_rows
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import families_of, group_points, only_point, shards
 from jaxbiped.study.manifest import Manifest
+from jaxbiped.study.runner import numbered
 from jaxbiped.study.store import read_points
 from tests.study.synthetic import rows
 
@@ -171,3 +172,25 @@ def test_a_study_from_a_file_is_the_one_that_the_command_has(tmp_path):
     study = jb.Study.from_toml(tmp_path / "s.toml")
     assert (study.shard, study.sensor, tuple(study.metrics)) == (3, None, ("spl",))
     assert study.config().shard == 3 and study.config().metrics == ("spl",)
+
+
+def test_another_executor_brings_the_defaults_that_depend_on_it():
+    for name in ("sampled", "kinematic"):
+        mission = jb.Study(jb.RandomArenas(count=2), ["full"], executor=name).config().mission
+        assert mission == jb.MissionConfig(executor=name)
+    own = jb.MissionConfig(robot={"radius": 0.11}, costs={"c3": 7.0})
+    mission = jb.Study(jb.RandomArenas(count=2), ["full"], own, executor="sampled").config().mission
+    assert (mission.robot.radius, mission.costs.c3, mission.executor) == (0.11, 7.0, "sampled")
+
+
+def test_numbers_of_components_are_those_of_missions_played_again():
+    @jax.tree_util.register_dataclass
+    @dataclass(frozen=True)
+    class Shy(GridPlanner):
+        fear: float = 3.0
+
+    strategy = Strategy("shy", Shy())
+    settings = jb.MissionConfig().settings(strategy)
+    assert float(numbered(settings, strategy, {"planner.fear": 5.0}).planner.fear) == 5.0
+    same = numbered(settings, strategy, {"sensor.reach": 1.0})
+    assert float(same.planner.fear) == 3.0 and same.sensor == settings.sensor
