@@ -8,22 +8,23 @@ from pathlib import Path
 from typing import Any
 
 from jaxbiped.arenas.source import Family, as_family
+from jaxbiped.core.component import as_component
 from jaxbiped.core.registry import EXECUTORS, FAMILIES, METRICS, SENSORS, STRATEGIES, Registry
 from jaxbiped.errors import InputError
 from jaxbiped.mission.config import EXECUTORS as BUILT_IN_EXECUTORS
 from jaxbiped.mission.config import SENSORS as BUILT_IN_SENSORS
-from jaxbiped.mission.execution import Executor, as_executor
+from jaxbiped.mission.execution import Executor
 from jaxbiped.mission.metric import Metric, as_metric, column_of
-from jaxbiped.mission.sensors import Sensor, as_sensor
+from jaxbiped.mission.sensors import Sensor
 from jaxbiped.mission.strategies import Strategy, as_strategy
 from jaxbiped.study.names import METRICS as BUILT_IN_METRICS
 from jaxbiped.study.names import STRATEGIES as BUILT_IN_STRATEGIES
 
 NAME = re.compile(r"[A-Za-z][\w.+-]{0,39}")  # of a sensor or an executor
 KINDS = (
-    (Metric, METRICS, as_metric, BUILT_IN_METRICS),
-    (Sensor, SENSORS, as_sensor, BUILT_IN_SENSORS),
-    (Executor, EXECUTORS, as_executor, BUILT_IN_EXECUTORS),
+    (Metric, METRICS, BUILT_IN_METRICS),
+    (Sensor, SENSORS, BUILT_IN_SENSORS),
+    (Executor, EXECUTORS, BUILT_IN_EXECUTORS),
 )
 
 
@@ -46,22 +47,23 @@ def register(thing: Any, name: str | None = None, *, replace: bool = False) -> s
         made = thing if name is None else replaced(thing, name=name)
         FAMILIES.add(made.name, made, replace=replace)
         return made.name
-    for base, registry, convert, built_in in KINDS:
+    for base, registry, built_in in KINDS:
         if isinstance(thing, base) or (isinstance(thing, type) and issubclass(thing, base)):
-            return add(registry, convert, thing, name or snake_case(thing), replace and name not in built_in, built_in)
+            return add(registry, base, built_in, thing, name or snake_case(thing), replace)
     strategy = named(thing) if name is None else replaced(named(thing), name=name)
     STRATEGIES.add(strategy.name, strategy, replace=replace and strategy.name not in BUILT_IN_STRATEGIES)
     return strategy.name
 
 
-def add(registry: Registry, convert, thing: Any, name: str, replace: bool, built_in: tuple[str, ...]) -> str:
+def add(registry: Registry, base: type, built_in: tuple[str, ...], thing: Any, name: str, replace: bool) -> str:
     """Put a component into its registry."""
     if not NAME.fullmatch(name):
         message = "must begin with a letter and have at most 40 letters, digits and . _ + -"
         raise InputError(message, field=f"name of a {registry.kind}", value=name)
-    if name in built_in and name not in registry:  # which is built in, and runs on the host
+    if name in built_in and name not in registry:  # one that runs on the host
         raise InputError("is taken by one that is built in", field="name", value=name)
-    registry.add(name, convert(thing, name), replace=replace and name not in built_in)
+    made = as_metric(thing, name) if base is Metric else as_component(thing, base, f"{registry.kind} {name}")
+    registry.add(name, made, replace=replace and name not in built_in)
     return name
 
 

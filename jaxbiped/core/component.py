@@ -42,6 +42,18 @@ def check_component(thing: object, base: type, where: str, hint: str = "") -> No
                 raise InputError(f"{kind} has a static field that cannot be hashed: {item.name}", field=where) from None
 
 
+def as_component(thing: object, base: type[C], where: str) -> C:
+    """A component of something that stands for one: an object of a class derived from `base`, or the class.
+
+    Raises:
+      InputError: anything else.
+    """
+    if isinstance(thing, type) and issubclass(thing, base):
+        thing = thing()
+    check_component(thing, base, where)
+    return thing
+
+
 def traced_component(component: C) -> C:
     """A component with its numbers as arrays of the types that programs compute with."""
     return jax.tree.map(lambda leaf: np.asarray(leaf, jax.dtypes.canonicalize_dtype(np.asarray(leaf).dtype)), component)

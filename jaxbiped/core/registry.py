@@ -85,6 +85,22 @@ class Registry(Generic[T]):
         yield from metadata.entry_points(group=self.group)
 
 
+def known_name(name: str, built_in: tuple[str, ...], registered: Registry, own: str, also: str = "") -> str:
+    """The name, where it may be that of a component; nothing is read or imported.
+
+    Args:
+      own: what `package.module:name` stands for, in words.
+      also: what else is allowed, in words.
+
+    Raises:
+      ValueError: what is allowed.
+    """
+    if not (name in built_in or registered.knows(name) or PLACE.fullmatch(name)):
+        known = ", ".join(dict.fromkeys([*built_in, *registered]))
+        raise ValueError(f"must be one of {known}, {also}or package.module:name of your own {own}")
+    return name
+
+
 def is_equal(one: object, other: object) -> bool:
     """Whether two entries are the same; those that cannot be compared, as with fields that are arrays, are not."""
     try:

@@ -10,8 +10,8 @@ import pydantic
 
 from jaxbiped.config import Model
 from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
-from jaxbiped.core.registry import PLACE, Registry
 from jaxbiped.core.registry import SENSORS as SENSORS_OWN
+from jaxbiped.core.registry import known_name
 from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mission.defaults import BELOW_POINTS as BELOW_POINTS
 from jaxbiped.mission.defaults import SIMULATED as SIMULATED
@@ -38,20 +38,12 @@ ICP = ("icp", "both")  # those that measure the pose by walls that were measured
 
 def known_sensor(name: str) -> str:
     """A name that is registered, or `package.module:name`, of which nothing is imported here."""
-    return known_component(name, SENSORS, SENSORS_OWN)
+    return known_name(name, SENSORS, SENSORS_OWN, "sensor")
 
 
 def known_executor(name: str) -> str:
     """The same of an executor."""
-    return known_component(name, EXECUTORS, EXECUTORS_OWN)
-
-
-def known_component(name: str, built_in: tuple[str, ...], registered: Registry) -> str:
-    """The name, where it may be that of a component."""
-    if not (name in built_in or registered.knows(name) or PLACE.fullmatch(name)):
-        known = ", ".join(dict.fromkeys([*built_in, *registered]))
-        raise ValueError(f"must be one of {known}, or package.module:name of your own {registered.kind}")
-    return name
+    return known_name(name, EXECUTORS, EXECUTORS_OWN, "executor")
 
 
 SensorName = Annotated[str, pydantic.AfterValidator(known_sensor)]

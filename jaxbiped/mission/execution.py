@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from jaxbiped.core.component import check_component
+from jaxbiped.core.component import as_component
 from jaxbiped.core.registry import EXECUTORS
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
@@ -52,18 +52,6 @@ class Executor:
         raise NotImplementedError(f"{type(self).__name__} has no method `execute`")
 
 
-def as_executor(thing: object, name: str) -> Executor:
-    """An executor of something that stands for one: an executor or its class.
-
-    Raises:
-      InputError: anything else.
-    """
-    if isinstance(thing, type) and issubclass(thing, Executor):
-        thing = thing()
-    check_component(thing, Executor, f"executor {name}")
-    return thing
-
-
 def find_executor(name: str) -> Executor | None:
     """The executor of a name in the registry, or of `package.module:name`, which is imported; None: a simulated biped.
 
@@ -72,7 +60,11 @@ def find_executor(name: str) -> Executor | None:
     """
     from jaxbiped.mission import executors  # noqa: F401  registers those that are built in
 
-    return None if name in SIMULATED else EXECUTORS.find(name, as_executor)
+    return (
+        None
+        if name in SIMULATED
+        else EXECUTORS.find(name, lambda thing, own: as_component(thing, Executor, f"executor {own}"))
+    )
 
 
 WANTED = {"moved": ((3,), "f"), "variances": ((3,), "f"), "time": ((), "f"), "distance": ((), "f")}

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from jaxbiped.core.component import check_component
+from jaxbiped.core.component import as_component
 from jaxbiped.core.registry import METRICS
 from jaxbiped.errors import InputError
 
@@ -66,24 +66,16 @@ class Metric:
         raise NotImplementedError(f"{type(self).__name__} has no method `result`")
 
 
-def check_metric(metric: object, name: str) -> None:
-    """Raise `InputError` unless an object can be a metric of this name inside a compiled program."""
-    if not NAME.fullmatch(name):
-        message = "must begin with a small letter and have at most 40 small letters, digits and _"
-        raise InputError(message, field="name of a metric", value=name)
-    check_component(metric, Metric, f"metric {name}")
-
-
 def as_metric(thing: object, name: str) -> Metric:
     """A metric of something that stands for one: a metric or its class.
 
     Raises:
       InputError: anything else, or a name that no column can have.
     """
-    if isinstance(thing, type) and issubclass(thing, Metric):
-        thing = thing()
-    check_metric(thing, name)
-    return thing
+    if not NAME.fullmatch(name):
+        message = "must begin with a small letter and have at most 40 small letters, digits and _"
+        raise InputError(message, field="name of a metric", value=name)
+    return as_component(thing, Metric, f"metric {name}")
 
 
 def find_metric(name: str) -> Metric:
@@ -94,7 +86,9 @@ def find_metric(name: str) -> Metric:
     """
     from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
 
-    return METRICS.find(name, lambda thing, own: as_metric(thing, column_of(f":{own}")))
+    found = METRICS.find(name, lambda thing, own: as_metric(thing, column_of(f":{own}")))
+    column = column_of(name)
+    return found if column in METRICS else METRICS.add(column, found)  # tables and figures ask for its unit
 
 
 def column_of(name: str) -> str:

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, UInt32
 
-from jaxbiped.core.component import check_component
+from jaxbiped.core.component import as_component
 from jaxbiped.core.registry import SENSORS
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
@@ -87,25 +87,17 @@ for _name, _sensor in BUILT_IN.items():
     SENSORS.add(_name, _sensor)
 
 
-def as_sensor(thing: object, name: str) -> Sensor:
-    """A sensor of something that stands for one: a sensor or its class.
-
-    Raises:
-      InputError: anything else.
-    """
-    if isinstance(thing, type) and issubclass(thing, Sensor):
-        thing = thing()
-    check_component(thing, Sensor, f"sensor {name}")
-    return thing
-
-
 def find_sensor(name: str) -> Sensor | None:
     """The sensor of a name in the registry, or of `package.module:name`, which is imported; None: on the host.
 
     Raises:
       InputError: a name that is not known, with those that are; a module that cannot be imported.
     """
-    return None if name in RENDERED else SENSORS.find(name, as_sensor)
+    return (
+        None
+        if name in RENDERED
+        else SENSORS.find(name, lambda thing, own: as_component(thing, Sensor, f"sensor {own}"))
+    )
 
 
 def view_of(sensor: Sensor, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:

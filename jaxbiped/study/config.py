@@ -11,8 +11,8 @@ from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
 from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
 from jaxbiped.core.registry import METRICS as METRICS_OWN
-from jaxbiped.core.registry import PLACE
 from jaxbiped.core.registry import STRATEGIES as REGISTERED
+from jaxbiped.core.registry import known_name
 from jaxbiped.mission.config import SIMULATED, MissionConfig
 from jaxbiped.study.names import FAMILIES, KNOWN, METRICS, MOVING, STRATEGIES
 
@@ -21,10 +21,9 @@ OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # what the names of compon
 
 def known_family(name: str) -> str:
     """A family that is built in or registered, a scene file, or `package.module:name`; nothing is read or imported."""
-    if not (name in KNOWN or name.endswith(".toml") or FAMILIES_OWN.knows(name) or PLACE.fullmatch(name)):
-        known = ", ".join(dict.fromkeys([*KNOWN, *FAMILIES_OWN]))
-        raise ValueError(f"must be one of {known}, a scene file (.toml), or package.module:name of your own generator")
-    return name
+    if name.endswith(".toml"):
+        return name
+    return known_name(name, KNOWN, FAMILIES_OWN, "generator", "a scene file (.toml), ")
 
 
 Family = Literal[KNOWN]
@@ -33,10 +32,7 @@ AnyFamily = Annotated[str, pydantic.AfterValidator(known_family)]
 
 def known_strategy(name: str) -> str:
     """A name that is registered, or `package.module:name`, of which nothing is imported here."""
-    if not (name in STRATEGIES or REGISTERED.knows(name) or PLACE.fullmatch(name)):
-        known = ", ".join(dict.fromkeys([*STRATEGIES, *REGISTERED]))
-        raise ValueError(f"must be one of {known}, or package.module:name of your own planner")
-    return name
+    return known_name(name, STRATEGIES, REGISTERED, "planner")
 
 
 StrategyName = Annotated[str, pydantic.AfterValidator(known_strategy)]
@@ -44,10 +40,7 @@ StrategyName = Annotated[str, pydantic.AfterValidator(known_strategy)]
 
 def known_metric(name: str) -> str:
     """The same of a metric."""
-    if not (name in METRICS or METRICS_OWN.knows(name) or PLACE.fullmatch(name)):
-        known = ", ".join(dict.fromkeys([*METRICS, *METRICS_OWN]))
-        raise ValueError(f"must be one of {known}, or package.module:name of your own metric")
-    return name
+    return known_name(name, METRICS, METRICS_OWN, "metric")
 
 
 MetricName = Annotated[str, pydantic.AfterValidator(known_metric)]
