@@ -17,7 +17,7 @@ class Measure:
     digits: int
     more: str  # what a greater value means
     less: str
-    smaller_is_better: bool
+    smaller_is_better: bool | None  # None: not known
 
     @property
     def title(self) -> str:
@@ -32,12 +32,13 @@ MEASURES = (SUCCESS, DISTANCE, TIME)
 
 
 def metric_measure(name: str) -> Measure:
-    """How the metric of a column is said: as it says itself, where it is registered here; nothing is imported."""
+    """How the metric of a column is said: as it says itself, where it is registered here. Nothing is imported: of one
+    that is not, numbers are shown as they are, and which are better is not said."""
     from jaxbiped.core.registry import METRICS
     from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
 
     if name not in METRICS:
-        return Measure(name, "", 1.0, 3, "more", "less", True)
+        return Measure(name, "", 1.0, 3, "more", "less", None)
     metric = METRICS.held[name]
     return Measure(name, metric.unit, metric.scale, metric.digits, "more", "less", metric.smaller_is_better)
 

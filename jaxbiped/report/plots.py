@@ -102,8 +102,9 @@ def forest(comparison: Comparison, first: str, second: str, measure: Measure) ->
     ax.set_xlim(-spread, spread)
     ax.set_yticks(range(count), names)
     ax.set_ylim(count - 0.4, -0.6)
-    left, right = (first, second) if measure.smaller_is_better else (second, first)
-    ax.set_xlabel(f"← {left} better\u2003\u2003{right} better →")
+    if measure.smaller_is_better is not None:
+        left, right = (first, second) if measure.smaller_is_better else (second, first)
+        ax.set_xlabel(f"← {left} better\u2003\u2003{right} better →")
     ax.set_title(f"{measure.name} [{measure.unit}]" if measure.unit else measure.name)
     ax.tick_params(axis="y", length=0)
     return figure

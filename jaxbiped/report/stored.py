@@ -8,6 +8,8 @@ from jaxbiped.report.answer import MEASURES, Measure
 from jaxbiped.report.tables import (
     Sheet,
     code_sheet,
+    metric_sheet,
+    metric_stratum_sheet,
     pair_sheet,
     short_stratum_sheet,
     strategy_sheets,
@@ -27,7 +29,7 @@ def terminal_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
     first, second = comparison.question
     kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
     strata = [short_stratum_sheet(comparison, first, second, kind) for kind in kinds]
-    return (*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison), *strata)
+    return (*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison), *others(comparison), *strata)
 
 
 def written_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
@@ -36,7 +38,14 @@ def written_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
     kinds = [kind for kind in ("family", "difficulty") if len(comparison.strata(kind)) > 1]
     rates = [success_sheet(comparison, kind) for kind in kinds]
     strata = [stratum_sheet(comparison, first, second, kind) for kind in kinds]
-    return (*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison), *rates, *strata)
+    metrics = [metric_stratum_sheet(comparison, first, second, kind) for kind in kinds if comparison.metrics]
+    own = (*strategy_sheets(comparison), code_sheet(comparison), pair_sheet(comparison), *others(comparison))
+    return (*own, *rates, *strata, *metrics)
+
+
+def others(comparison: Comparison) -> tuple[Sheet, ...]:
+    """The table of metrics beside success, distance and time, where there are any."""
+    return (metric_sheet(comparison, *comparison.question),) if comparison.metrics else ()
 
 
 def equivalence_sheets(found: Sequence[Equivalence]) -> tuple[Sheet, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rich import box
@@ -15,6 +16,12 @@ from jaxbiped.report.words import NONE, brackets, number, p_cell, percent, signe
 from jaxbiped.study import ALL, CODES, Comparison, Estimate, PairComparison, PairedMetric
 
 Row = tuple[str, ...]
+MEANING = {
+    "spl": "success weighted by path length",
+    "clearance": "the least distance from boxes",
+    "replans": "plans but the first",
+    "measuring": "the share of time spent so",
+}
 
 
 @dataclass(frozen=True)
@@ -193,35 +200,14 @@ def metric_sheet(comparison: Comparison, first: str, second: str) -> Sheet:
         difference, p = part(pair, measure)
         means = [comparison.summary(name).metrics[measure.name].estimate for name in (first, second)]
         own = [number(None if mean is None else mean * measure.scale, measure.digits) for mean in means]
-        value = signed(difference.estimate * measure.scale if difference.valid else None, measure.digits)
-        limits = brackets(difference, measure.scale, measure.digits)
-        rows.append(
-            (measure.title, *own, str(difference.n), value if limits == NONE else f"{value} {limits}", p_cell(p))
-        )
+        rows.append((measure.title, *own, str(difference.n), difference_cell(difference, measure), p_cell(p)))
     columns = ("metric", first, second, "both", "difference", "p")
     notes = (
         f"Means over a strategy's own missions that have the number, then differences where both have it, with "
         f"{100 * comparison.level:g} % intervals and p-values corrected by Holm's method for this table.",
-        "spl: success weighted by path length; clearance: the least distance from boxes; replans: plans but the first; "
-        "measuring: the share of time spent so.",
+        *explained(comparison),
     )
     return Sheet(f"Other metrics: {first} - {second}", columns, (tuple(rows),), notes)
-
-
-def metric_stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
-    """A pair's differences in these metrics in every stratum of a kind: a row each."""
-    measures, rows = metric_measures(comparison), []
-    for stratum in (ALL, *comparison.strata(kind)):
-        cells = [stratum.name]
-        for measure in measures:
-            difference, p = part(comparison.pair(first, second, stratum), measure)
-            value = signed(difference.estimate * measure.scale if difference.valid else None, measure.digits)
-            limits = brackets(difference, measure.scale, measure.digits)
-            cells += [str(difference.n), value if limits == NONE else f"{value} {limits}", p_cell(p)]
-        rows.append(tuple(cells))
-    columns = (kind, *(cell for measure in measures for cell in ("both", measure.title, "p")))
-    notes = (f"Differences, first minus second; p-values corrected by Holm's method within {kind} tables of metrics.",)
-    return Sheet(f"Other metrics, {first} - {second} by {kind}", columns, (tuple(rows[:1]), tuple(rows[1:])), notes)
 
 
 def short_stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
@@ -245,21 +231,45 @@ def short_stratum_sheet(comparison: Comparison, first: str, second: str, kind: s
 
 def stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
     """One pair in every stratum of a kind: a row each."""
-    pairs = [comparison.pair(first, second, stratum) for stratum in (ALL, *comparison.strata(kind))]
+    return measures_by_stratum(comparison, first, second, kind, MEASURES, f"{first} - {second} by {kind}")
+
+
+def metric_stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
+    """The same of metrics beside success, distance and time."""
+    title = f"Other metrics, {first} - {second} by {kind}"
+    return measures_by_stratum(comparison, first, second, kind, metric_measures(comparison), title)
+
+
+def measures_by_stratum(
+    comparison: Comparison, first: str, second: str, kind: str, measures: Sequence[Measure], title: str
+) -> Sheet:
+    """Differences of measures of a pair, in every stratum of a kind."""
     rows = []
-    for pair in pairs:
-        cells = (pair.stratum.name,)
-        for measure in MEASURES:
-            estimate, p = part(pair, measure)
-            value = signed(estimate.estimate * measure.scale if estimate.valid else None, measure.digits)
-            limits = brackets(estimate, measure.scale, measure.digits)
-            cells += (str(estimate.n), value if limits == NONE else f"{value} {limits}", p_cell(p))
+    for stratum in (ALL, *comparison.strata(kind)):
+        cells = (stratum.name,)
+        for measure in measures:
+            estimate, p = part(comparison.pair(first, second, stratum), measure)
+            cells += (str(estimate.n), difference_cell(estimate, measure), p_cell(p))
         rows.append(cells)
     columns = (kind,)
-    for measure in MEASURES:
-        columns += ("arenas" if measure is SUCCESS else "both", f"{measure.name}, {measure.unit}", "p")
-    notes = (f"Differences, first minus second; p-values corrected by Holm's method within {kind} tables.",)
-    return Sheet(f"{first} - {second} by {kind}", columns, (tuple(rows[:1]), tuple(rows[1:])), notes)
+    for measure in measures:
+        columns += ("arenas" if measure is SUCCESS else "both", measure.title, "p")
+    what = f"{kind} tables" if measures is MEASURES else f"{kind} tables of metrics"
+    notes = (f"Differences, first minus second; p-values corrected by Holm's method within {what}.",)
+    return Sheet(title, columns, (tuple(rows[:1]), tuple(rows[1:])), notes)
+
+
+def explained(comparison: Comparison) -> Row:
+    """What the metrics that are built in mean, those of a comparison."""
+    said = [f"{name}: {text}" for name, text in MEANING.items() if name in comparison.metrics]
+    return (f"{'; '.join(said)}.",) if said else ()
+
+
+def difference_cell(estimate: Estimate, measure: Measure) -> str:
+    """A difference with its interval, in the measure's unit."""
+    value = signed(estimate.estimate * measure.scale if estimate.valid else None, measure.digits)
+    limits = brackets(estimate, measure.scale, measure.digits)
+    return value if limits == NONE else f"{value} {limits}"
 
 
 def success_sheet(comparison: Comparison, kind: str) -> Sheet:

@@ -8,12 +8,13 @@ from typing import TypeVar
 
 import numpy as np
 import polars as pl
+from jaxtyping import Float
 
 from jaxbiped.study.intervals import NOTHING, Estimate, mean_estimate
-from jaxbiped.study.paired import PairedMetric, holm, improvement, signed_rank
+from jaxbiped.study.paired import PairedMetric, holm, paired_metric
 
 SECOND = "#second"  # after a column of the second side: no name of a column ends so
-DIGITS = 6  # after the point: what agrees within these is a tie; sums of floats in another order differ by less
+ROUNDING = 1e-6  # of the greater number: what agrees within it is a tie, as sums of floats in another order do
 
 
 def metric_means(rows: pl.DataFrame, names: Sequence[str]) -> dict[str, Estimate]:
@@ -34,17 +35,17 @@ def metric_pairs(
     found = {}
     for name in names:
         there = both.drop_nulls([name, f"{name}{SECOND}"])
-        differences = np.round(there[name].to_numpy() - there[f"{name}{SECOND}"].to_numpy(), DIGITS)
-        found[name] = PairedMetric(
-            mean=mean_estimate(differences, seed=seed, resamples=resamples, level=level),
-            median=NOTHING,
-            improvement=improvement(differences, level),
-            p=signed_rank(differences),
-            p_holm=None,
-            n=len(differences),
-            zeros=int(np.sum(differences == 0)),
-        )
+        values = [there[column].to_numpy() for column in (name, f"{name}{SECOND}")]
+        differences = without_rounding(*values)
+        mean = mean_estimate(differences, seed=seed, resamples=resamples, level=level)
+        found[name] = paired_metric(differences, mean, NOTHING, level)
     return found
+
+
+def without_rounding(first: Float[np.ndarray, "n"], second: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Differences, first minus second, of which those within the numbers' own rounding are zero."""
+    differences = first - second
+    return np.where(np.abs(differences) <= ROUNDING * np.maximum(np.abs(first), np.abs(second)), 0.0, differences)
 
 
 P = TypeVar("P")

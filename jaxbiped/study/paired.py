@@ -99,6 +99,11 @@ def metric_difference(
     # Sums of steps in another order differ by rounding (float32): what agrees within 0.1 mm or 0.1 ms is a tie.
     differences = np.round(first - second, 4)
     mean, median = mean_and_median(differences, seed=seed, resamples=resamples, level=level)
+    return paired_metric(differences, mean, median, level)
+
+
+def paired_metric(differences: Float[np.ndarray, "n"], mean: Estimate, median: Estimate, level: float) -> PairedMetric:
+    """All that is said of differences, whose mean and median have been estimated."""
     return PairedMetric(
         mean=mean,
         median=median,
