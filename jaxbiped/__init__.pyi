@@ -1,24 +1,13 @@
 """The public names for type checkers; `__init__.py` loads them when they are used. A test compares the two."""
 
-from jaxbiped.api.plan import PlannedPath as PlannedPath
 from jaxbiped.api.plan import plan as plan
 from jaxbiped.api.register import register as register
 from jaxbiped.api.results import Results as Results
-from jaxbiped.api.run import (
-    PlayedMission as PlayedMission,
-)
-from jaxbiped.api.run import (
-    evaluate as evaluate,
-)
-from jaxbiped.api.run import (
-    load as load,
-)
-from jaxbiped.api.run import (
-    play as play,
-)
-from jaxbiped.api.run import (
-    sweep as sweep,
-)
+from jaxbiped.api.run import PlayedMission as PlayedMission
+from jaxbiped.api.run import evaluate as evaluate
+from jaxbiped.api.run import load as load
+from jaxbiped.api.run import play as play
+from jaxbiped.api.run import sweep as sweep
 from jaxbiped.api.stored import compare as compare
 from jaxbiped.api.study import RandomArenas as RandomArenas
 from jaxbiped.api.study import Scenes as Scenes
@@ -34,7 +23,6 @@ from jaxbiped.errors import InputError as InputError
 from jaxbiped.mapping.class_grid import ClassGrid as ClassGrid
 from jaxbiped.mapping.grid import Cell as Cell
 from jaxbiped.mission.config import CostConfig as CostConfig
-from jaxbiped.mission.config import LimitConfig as LimitConfig
 from jaxbiped.mission.config import MissionConfig as MissionConfig
 from jaxbiped.mission.execution import Execution as Execution
 from jaxbiped.mission.execution import Executor as Executor
@@ -42,56 +30,25 @@ from jaxbiped.mission.executors import Kinematic as Kinematic
 from jaxbiped.mission.executors import Sampled as Sampled
 from jaxbiped.mission.host_sensor import HostSensor as HostSensor
 from jaxbiped.mission.metric import Metric as Metric
-from jaxbiped.mission.metric import MissionEnd as MissionEnd
-from jaxbiped.mission.metric import Step as Step
 from jaxbiped.mission.outcome import Code as Code
 from jaxbiped.mission.sensors import Oracle as Oracle
 from jaxbiped.mission.sensors import RayCast as RayCast
 from jaxbiped.mission.sensors import Sensor as Sensor
-from jaxbiped.mission.sensors import Standpoint as Standpoint
 from jaxbiped.mission.strategies import Strategy as Strategy
 from jaxbiped.motion.config import DurationConfig as DurationConfig
 from jaxbiped.motion.config import RobotConfig as RobotConfig
 from jaxbiped.planning.costs import DIRECTIONS as DIRECTIONS
 from jaxbiped.planning.costs import Costs as Costs
 from jaxbiped.planning.costs import Rules as Rules
-from jaxbiped.planning.costs import edge_costs as edge_costs
 from jaxbiped.planning.host_planner import HostPlanner as HostPlanner
-from jaxbiped.planning.planners import (
-    GridPlanner as GridPlanner,
-)
-from jaxbiped.planning.planners import (
-    HeadingPlanner as HeadingPlanner,
-)
-from jaxbiped.planning.planners import (
-    Planner as Planner,
-)
-from jaxbiped.planning.planners import (
-    Problem as Problem,
-)
-from jaxbiped.planning.planners import (
-    Route as Route,
-)
-from jaxbiped.planning.planners import (
-    StraightLine as StraightLine,
-)
+from jaxbiped.planning.planners import GridPlanner as GridPlanner
+from jaxbiped.planning.planners import HeadingPlanner as HeadingPlanner
+from jaxbiped.planning.planners import Planner as Planner
+from jaxbiped.planning.planners import Problem as Problem
+from jaxbiped.planning.planners import Route as Route
+from jaxbiped.planning.planners import StraightLine as StraightLine
 from jaxbiped.planning.ways import cells_along as cells_along
 from jaxbiped.planning.ways import free_cells as free_cells
-from jaxbiped.sensing.config import (
-    CameraConfig as CameraConfig,
-)
-from jaxbiped.sensing.config import (
-    LandmarkConfig as LandmarkConfig,
-)
-from jaxbiped.sensing.config import (
-    NoiseConfig as NoiseConfig,
-)
-from jaxbiped.sensing.config import (
-    OdometryConfig as OdometryConfig,
-)
-from jaxbiped.sensing.hashing import fold as fold
-from jaxbiped.sensing.hashing import normal as normal
-from jaxbiped.sensing.hashing import uniform as uniform
 from jaxbiped.sensing.view import View as View
 
 Box = _BoxConfig

@@ -19,7 +19,7 @@ def tiny_mission(planner: Any = "full") -> PlayedMission:
     """
     import jaxbiped as jb
 
-    still = jb.OdometryConfig(forward=0.0, lateral=0.0, yaw_walked=0.0, yaw_turned=0.0)
+    still = dict.fromkeys(("forward", "lateral", "yaw_walked", "yaw_turned"), 0.0)
     config = jb.MissionConfig(sensor="oracle", odometry=still)
     return jb.play(tiny_scene(), planner, config)
 

@@ -54,7 +54,8 @@ def sweep(
     """The same at every combination of values: `{"costs.c3": [2, 5, 10], "planner.clearance": [0, 0.1]}`.
 
     Args:
-      axes: dotted fields of the mission's config, `population.<field>`, or `planner.<field>` of your own planner.
+      axes: dotted fields of the mission's config, `population.<field>`, or `planner.<field>`, `sensor.<field>` and
+        `executor.<field>` of your own.
       out, on_progress: as of `evaluate`.
 
     Raises:

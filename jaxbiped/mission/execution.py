@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import jax
@@ -72,7 +72,7 @@ WANTED |= {name: ((), "b") for name in ("collided", "fell", "outside")}
 
 
 def execution_of(executor: Executor, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
-    """What an executor makes of a command, checked.
+    """What an executor makes of a command, checked. What is no distance or no time becomes a pose that is not finite.
 
     Raises:
       InputError: something that is no execution of one robot.
@@ -89,4 +89,11 @@ def execution_of(executor: Executor, arena: Any, world: Any, command: Any, setti
             wanted = f"{'truth values' if kind == 'b' else 'real numbers'} of shape {list(shape)}"
             message = f"gave {jnp.result_type(value)}{list(found[0])} where {wanted} are wanted"
             raise InputError(message, field=f"{where}: {name}")
-    return made
+    from jaxbiped.mission.executors import Kinematic, Sampled
+
+    if type(executor) in (Kinematic, Sampled):
+        return made
+    sane = jnp.isfinite(made.distance + made.time + made.pose.z) & (made.distance >= 0) & (made.time >= 0)
+    pose = replace(made.pose, x=jnp.where(sane, made.pose.x, jnp.nan))  # which ends the mission as `invalid`
+    distance, time = (jnp.where(sane, value, 0.0) for value in (made.distance, made.time))
+    return replace(made, pose=pose, distance=distance, time=time)

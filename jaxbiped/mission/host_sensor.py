@@ -36,7 +36,7 @@ class HostSensor(Sensor):
       pixels that each stands for (1 by default); at most as many as `points` of this object.
 
     A function that raises an error, or returns anything else, ends its mission as `invalid`; the first such error of a
-    process is told on stderr. Arenas have no terrain and nothing that moves.
+    process is told on stderr. Arenas have no terrain; boxes that move are where they are at that moment.
     """
 
     function: ViewFunction = field(metadata={"static": True})

@@ -40,6 +40,7 @@ class Sensor:
 
     knows_pose: ClassVar[bool] = False  # the robot knows where it stands, and its points are level
     on_terrain: ClassVar[bool] = False  # it knows arenas with terrain
+    is_picture: ClassVar[bool] = False  # its points are those of the camera's rays, row by row
 
     def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
         """Points in the robot frame of one `Arena`.
@@ -58,7 +59,7 @@ class Sensor:
 class RayCast(Sensor):
     """True depth, as a stereo matcher would measure it; see `sensing.raycast`."""
 
-    on_terrain = True
+    on_terrain, is_picture = True, True
 
     def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
         """See `Sensor`."""

@@ -13,6 +13,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.config import Model
 from jaxbiped.core.component import traced_component as traced_component
+from jaxbiped.errors import InputError
 from jaxbiped.geometry.height_field import HeightField, height_range
 from jaxbiped.mapping import Body, GridSpec, MapParams
 from jaxbiped.mission.config import BELOW_POINTS as BELOW_POINTS
@@ -94,12 +95,20 @@ class Program:
 
 
 def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> Program:
-    """The static part of a config for arenas of one size [m], and with such terrain, whose heights are concrete."""
+    """The static part of a config for arenas of one size [m], and with such terrain, whose heights are concrete.
+
+    Raises:
+      InputError: a pitch that does not divide the size, or walls to be matched by a sensor without pictures.
+    """
     heights = (0.0, 0.0) if terrain is None else height_range(terrain)
     sensor, executor = find_sensor(config.sensor), find_executor(config.executor)
     places_feet = True if executor is None else executor.places_feet
     footing = places_feet if config.foot_placement is None else config.foot_placement
     knows_pose = sensor is not None and sensor.knows_pose
+    if config.localisation in ICP and not (sensor is None or sensor.is_picture or knows_pose):
+        raise InputError(
+            f"needs a picture, and {config.sensor} measures none", field="localisation", value=config.localisation
+        )
     return Program(
         config.grid(size_xy, heights),
         config.camera.image,

@@ -11,6 +11,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import os
 import socket
 import time
 import uuid
@@ -18,6 +19,7 @@ import warnings
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import CancelledError
 from itertools import islice
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import polars as pl
@@ -258,6 +260,11 @@ def knock(scheduler: str) -> None:
         )
 
 
+def here() -> str:
+    """Where workers look for modules: where this process is told to, and in the working directory, as it does."""
+    return os.pathsep.join([*filter(None, [os.environ.get("PYTHONPATH")]), str(Path.cwd())])
+
+
 @contextlib.contextmanager
 def local_cluster(workers: int) -> Iterator[Client]:
     """A client of worker processes on this machine, among which its cores are shared out; they end with it."""
@@ -270,7 +277,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
             dashboard_address="127.0.0.1:0",
             memory_limit=0,  # a worker is not killed for what it needs while it compiles
             silence_logs=logging.CRITICAL,
-            env={"PJRT_NPROC": threads},  # XLA's own threads
+            env={"PJRT_NPROC": threads, "PYTHONPATH": here()},  # XLA's own threads; where modules are looked for
             preload=[DEAF],
         ) as cluster,
         Client(cluster, set_as_default=False) as client,

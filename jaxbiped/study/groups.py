@@ -92,7 +92,7 @@ def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
     """The families of a study, in their turns.
 
     Raises:
-      InputError: one that is not known, a scene that is wrong, two of one name, arenas of different sizes.
+      InputError: one that is not known, a scene that is wrong, two of one name.
     """
     found = tuple(map(find_family, config.families))
     names = [name_of(item) for item in found]
@@ -173,7 +173,7 @@ def check_numbers(point: Point, strategies: Sequence[Strategy]) -> None:
         kind, _, name = dotted.partition(".")
         if name not in there.get(kind, ()):
             known = f"has {', '.join(there[kind])}" if there.get(kind) else "has none"
-            raise InputError(f"no {kind} of these missions has this number; {kind} {known}", field=f"axis {dotted}")
+            raise InputError(f"no {kind} of these missions has this number; {kind} {known}", field=dotted)
 
 
 def numbers_under(kind: str, numbers: Mapping[str, float]) -> dict[str, float]:

@@ -17,6 +17,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.config import MissionConfig
 from jaxbiped.study.axes import Axis, Sobol, told
 from jaxbiped.study.config import OF_COMPONENTS, StudyConfig
+from jaxbiped.study.names import KNOWN
 
 if TYPE_CHECKING:
     from jaxbiped.study.groups import Point
@@ -66,6 +67,7 @@ class SweepConfig(StudyConfig):
           InputError: a field that is unknown, not a number, or swept twice; a value that its field does not allow,
             alone or with the others of its point; more points than memory holds.
         """
+        from jaxbiped.arenas.families import SIZE_X, SIZE_Y
         from jaxbiped.study.memory import most_points
 
         fields = self.fields()
@@ -84,6 +86,7 @@ class SweepConfig(StudyConfig):
             family = FAMILY_OF.get(name.removeprefix(f"{POPULATION}."))
             if family and family not in self.families:
                 raise InputError(f"needs the family {family} among the families", field=f"axis {name}")
+        size_xy = (SIZE_X, SIZE_Y) if set(self.families) <= set(KNOWN) else None
         own = []
         if self.base:
             for name in fields:
@@ -95,7 +98,7 @@ class SweepConfig(StudyConfig):
                 if leaves[name] is None:
                     raise InputError("has no value in the config for the base point; give it one", field=name)
         for index, values in enumerate(itertools.chain(own, self.combinations())):
-            yield point_at(index, values, mission, population)
+            yield point_at(index, values, mission, population, size_xy)
 
     def combinations(self) -> Iterator[dict[str, float]]:
         """Field to value, for each point."""
@@ -109,9 +112,18 @@ class SweepConfig(StudyConfig):
             yield {name: value for part in row for name, value in part.items()}
 
 
-def point_at(index: int, values: dict[str, float], mission: dict[str, Any], population: dict[str, Any]) -> Point:
-    """One sweep point: the config with some of its fields replaced; InputError about the one that is not allowed."""
-    from jaxbiped.arenas.families import SIZE_X, SIZE_Y
+def point_at(
+    index: int,
+    values: dict[str, float],
+    mission: dict[str, Any],
+    population: dict[str, Any],
+    size_xy: tuple[float, float] | None = None,
+) -> Point:
+    """One sweep point: the config with some of its fields replaced; InputError about the one that is not allowed.
+
+    Args:
+      size_xy: [m] of all arenas, which its pitch must divide; None: that is looked at when they are known.
+    """
     from jaxbiped.mission.settings import program
     from jaxbiped.study.groups import Point
 
@@ -125,7 +137,8 @@ def point_at(index: int, values: dict[str, float], mission: dict[str, Any], popu
             mission = replaced(mission, name.split("."), value)
     kind = validated(MissionConfig, mission, values)
     try:
-        program(kind, (SIZE_X, SIZE_Y))
+        if size_xy is not None:
+            program(kind, size_xy)
     except InputError as error:
         raise InputError(f"{shown(values)}: {error}", field="axes") from None
     drawn = validated(PopulationConfig, population, values, f"{POPULATION}.")

@@ -20,6 +20,7 @@ def corridor(key):
     return jb.make_arena(boxes, start=(0.2, 0.7, 0.0), goal=(1.5, 0.7), difficulty=1 - width)
 
 
-count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-study = jb.Study(jb.RandomArenas(families=[corridor], count=count), ["full", "floor_only"])
-print(jb.evaluate(study).compare("full", "floor_only"))
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    study = jb.Study(jb.RandomArenas(families=[corridor], count=count), ["full", "floor_only"])
+    print(jb.evaluate(study).compare("full", "floor_only"))

@@ -24,8 +24,9 @@ class TurnedAngle(jb.Metric):
         return state, end.result.code == jb.Code.REACHED  # the number, and whether there is one
 
 
-count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-study = jb.Study(jb.RandomArenas(count=count), ["full", "floor_only"], metrics=["spl", TurnedAngle()])
-results = jb.evaluate(study)
-print(results.compare("full", "floor_only"))
-results.plot("turned_angle").savefig("turned_angle.png")
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    study = jb.Study(jb.RandomArenas(count=count), ["full", "floor_only"], metrics=["spl", TurnedAngle()])
+    results = jb.evaluate(study)
+    print(results.compare("full", "floor_only"))
+    results.plot("turned_angle").savefig("turned_angle.png")

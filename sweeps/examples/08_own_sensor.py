@@ -19,8 +19,9 @@ class ShortSighted(jb.RayCast):
         return replace(view, weight=jnp.where(jnp.hypot(view.x, view.y) < self.reach, view.weight, 0.0))
 
 
-count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-study = jb.Study(jb.RandomArenas(count=count), ["full"], sensor=ShortSighted())
-results = jb.sweep(study, {"sensor.reach": [0.4, 0.7, 1.5]})
-print(results)
-results.plot("time").savefig("reach.png")
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    study = jb.Study(jb.RandomArenas(count=count), ["full"], sensor=ShortSighted())
+    results = jb.sweep(study, {"sensor.reach": [0.4, 0.7, 1.5]})
+    print(results)
+    results.plot("time").savefig("reach.png")

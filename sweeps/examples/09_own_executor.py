@@ -8,8 +8,6 @@ import jax.numpy as jnp
 
 import jaxbiped as jb
 
-SLIP = 100  # channel of a mission's seed, beside those that are in use
-
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
@@ -18,11 +16,12 @@ class Slippery(jb.Kinematic):
 
     def execute(self, arena, world, command, settings):
         done = super().execute(arena, world, command, settings)
-        drawn = jb.uniform(jb.fold(world.seed, SLIP, world.decisions), 0)
-        slips = (command.rise != 0) & (drawn < self.chance)
+        key = jax.random.fold_in(jax.random.key(world.seed), world.decisions)
+        slips = (command.rise != 0) & (jax.random.uniform(key) < self.chance)
         return replace(done, fell=done.fell | (slips & ~done.collided), time=jnp.where(slips, 0.0, done.time))
 
 
-count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-study = jb.Study(jb.RandomArenas(["bump", "stairs"], count=count), ["full", "floor_only"], executor=Slippery())
-print(jb.sweep(study, {"executor.chance": [0.0, 0.1, 0.3]}))
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    study = jb.Study(jb.RandomArenas(["bump", "stairs"], count=count), ["full", "floor_only"], executor=Slippery())
+    print(jb.sweep(study, {"executor.chance": [0.0, 0.1, 0.3]}))

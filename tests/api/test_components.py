@@ -1,5 +1,7 @@
 """A sensor, an executor and metrics of people's own in the closed loop, and what built-in metrics say."""
 
+import importlib.util
+import sys
 from dataclasses import dataclass, replace
 
 import jax
@@ -11,42 +13,20 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.arenas import sample
 from jaxbiped.study.schema import FAMILIES
+from tests.api.conftest import EXAMPLES
 
 
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class ShortSighted(jb.RayCast):
-    reach: float = 9.0  # [m]
-
-    def measure(self, arena, at, settings, program):
-        view = super().measure(arena, at, settings, program)
-        return replace(view, weight=jnp.where(jnp.hypot(view.x, view.y) < self.reach, view.weight, 0.0))
+def example(name):
+    """The module of a numbered example, without what it does as a script."""
+    spec = importlib.util.spec_from_file_location(f"example_{name[:2]}", EXAMPLES / f"{name}.py")
+    sys.modules[spec.name] = module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Slippery(jb.Kinematic):
-    chance: float = 0.0  # of a fall, in a step up or down
-
-    def execute(self, arena, world, command, settings):
-        done = super().execute(arena, world, command, settings)
-        slips = (command.rise != 0) & (jb.uniform(jb.fold(world.seed, 100, world.decisions), 0) < self.chance)
-        return replace(done, fell=done.fell | (slips & ~done.collided))
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class TurnedAngle(jb.Metric):
-    unit = "rad"
-
-    def start(self, arena, settings):
-        return jnp.zeros(())
-
-    def update(self, state, step):
-        return state + jnp.abs(step.command.turn)
-
-    def result(self, state, end):
-        return state, end.result.code == jb.Code.REACHED
+TurnedAngle = example("07_own_metric").TurnedAngle
+ShortSighted = example("08_own_sensor").ShortSighted
+Slippery = example("09_own_executor").Slippery
 
 
 @jax.tree_util.register_dataclass
@@ -67,8 +47,8 @@ def swept():
         jb.MissionConfig(robot={"radius": 0.1}),  # by default 0.125 for any executor but `kinematic`
         seed=5,
         metrics=["clearance", "spl", TurnedAngle(), Hopeless()],
-        sensor=ShortSighted(),
-        executor=Slippery(),
+        sensor=ShortSighted(reach=9.0),
+        executor=Slippery(chance=0.0),
     )
     with pytest.warns(RuntimeWarning, match="metric hopeless: not finite in [0-9]+ of 48"):
         return jb.sweep(study, AXES)

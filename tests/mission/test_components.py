@@ -13,8 +13,9 @@ from jaxbiped.core.registry import EXECUTORS, METRICS, SENSORS
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.execution import Execution, execution_of, find_executor
 from jaxbiped.mission.host_sensor import HostSensor
-from jaxbiped.mission.metric import as_metric, column_of, find_metric, numbers_at_end, updated
+from jaxbiped.mission.metric import MissionEnd, Step, as_metric, column_of, find_metric, numbers_at_end, updated
 from jaxbiped.mission.sensors import Standpoint, find_sensor, view_of
+from jaxbiped.mission.settings import program
 from jaxbiped.sensing.view import View
 
 ZERO, NO = jnp.zeros(()), jnp.zeros((), bool)
@@ -39,7 +40,7 @@ def component(base, **methods):
 def test_results_of_metrics_that_are_no_number_are_named(made, match):
     metric = component(jb.Metric, result=lambda self, state, end: made)
     with pytest.raises(jb.InputError, match=match) as caught:
-        numbers_at_end((metric,), ((),), jb.MissionEnd(None, None, None, None))
+        numbers_at_end((metric,), ((),), MissionEnd(None, None, None, None))
     assert "metric Made" in str(caught.value)
 
 
@@ -47,7 +48,7 @@ def test_results_of_metrics_that_are_no_number_are_named(made, match):
 def test_a_memory_that_changes_its_shape_is_named(new):
     metric = component(jb.Metric, update=lambda self, state, step: new)
     with pytest.raises(jb.InputError, match=r"update returned .* where its start gave float32\[\]"):
-        updated((metric,), (ZERO,), jb.Step(None, None, None, None, NO, None))
+        updated((metric,), (ZERO,), Step(None, None, None, None, NO, None))
 
 
 @pytest.mark.parametrize("name", ["", "Upper", "with space", "9", "a" * 41, "x-y", "ü"])
@@ -171,7 +172,37 @@ FINE = Execution(AT.pose, jnp.zeros(3), jnp.zeros(3), ZERO, ZERO, NO, NO, NO)
 def test_executions_of_the_wrong_shape_are_named(made, match):
     with pytest.raises(jb.InputError, match=match):
         execution_of(component(jb.Executor, execute=lambda *_: made), None, None, None, None)
-    assert execution_of(component(jb.Executor, execute=lambda *_: FINE), None, None, None, None) is FINE
+
+
+@pytest.mark.parametrize(
+    "change, sane",
+    [
+        ({}, True),
+        ({"distance": jnp.float32(np.nan)}, False),
+        ({"distance": jnp.float32(-1.0)}, False),
+        ({"time": jnp.float32(np.inf)}, False),
+        ({"time": jnp.float32(-0.1)}, False),
+        ({"pose": replace(AT.pose, z=jnp.float32(np.nan))}, False),
+    ],
+)
+def test_what_is_no_distance_or_time_makes_a_mission_invalid_and_spoils_no_row(change, sane):
+    made = replace(FINE, **change)
+    found = execution_of(component(jb.Executor, execute=lambda *_: made), None, None, None, None)
+    assert np.isfinite(found.pose.x) == sane and np.isfinite(found.distance + found.time)
+    assert found.distance >= 0 and found.time >= 0
+
+
+def test_walls_are_not_matched_by_a_sensor_without_pictures():
+    jb.register(HostSensor(len), "lone_points", replace=True)
+    try:
+        for way in ("icp", "both"):
+            config = jb.MissionConfig(sensor="lone_points", localisation=way)
+            with pytest.raises(jb.InputError, match="localisation: needs a picture, and lone_points measures none"):
+                program(config, (1.8, 1.4))
+        for sensor, way in (("lone_points", "odometry"), ("raycast", "icp"), ("oracle", "icp"), ("stereo", "both")):
+            program(jb.MissionConfig(sensor=sensor, localisation=way), (1.8, 1.4))
+    finally:
+        SENSORS.held.pop("lone_points")
 
 
 def arena():

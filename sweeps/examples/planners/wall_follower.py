@@ -24,7 +24,7 @@ class WallFollower(jb.Planner):
     def plan(self, problem):
         """One move."""
         following, met, last = problem.state
-        free = jnp.isfinite(jb.edge_costs(problem.classes, problem.levels, problem.costs, problem.rules))
+        free = jnp.isfinite(jb.GridPlanner().edge_costs(problem))
         free = free[:, problem.start_ij[0], problem.start_ij[1]]
         away = (problem.goal_ij - problem.start_ij).astype(jnp.float32)
         straight = jnp.argmin(jnp.hypot(*(away[:, None] - MOVES.T)))
