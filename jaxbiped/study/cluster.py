@@ -11,7 +11,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
-import os
 import socket
 import time
 import uuid
@@ -260,9 +259,9 @@ def knock(scheduler: str) -> None:
         )
 
 
-def here() -> str:
-    """Where workers look for modules: where this process is told to, and in the working directory, as it does."""
-    return os.pathsep.join([*filter(None, [os.environ.get("PYTHONPATH")]), str(Path.cwd())])
+def as_here() -> str:
+    """What a worker runs first, so that it finds the modules of the working directory, as this process does."""
+    return f"import sys; sys.path.append({str(Path.cwd())!r})"
 
 
 @contextlib.contextmanager
@@ -277,8 +276,8 @@ def local_cluster(workers: int) -> Iterator[Client]:
             dashboard_address="127.0.0.1:0",
             memory_limit=0,  # a worker is not killed for what it needs while it compiles
             silence_logs=logging.CRITICAL,
-            env={"PJRT_NPROC": threads, "PYTHONPATH": here()},  # XLA's own threads; where modules are looked for
-            preload=[DEAF],
+            env={"PJRT_NPROC": threads},  # XLA's own threads
+            preload=[DEAF, as_here()],
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):

@@ -16,6 +16,7 @@ import psutil
 import pytest
 
 from jaxbiped import cli
+from jaxbiped.arenas.source import find_family, name_of
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.study import cluster, store
@@ -307,3 +308,12 @@ def test_commands_on_workers_give_the_local_table(monkeypatch, tmp_path):
     assert running.wait() == 0
     spread = store.read(tmp_path / "spread")[0]
     assert spread.height == 32 and spread.filter(pl.col("arena").is_in(local["arena"].unique().to_list())).equals(local)
+
+
+def test_workers_of_this_machine_find_modules_of_the_working_directory(tmp_path, monkeypatch):
+    """A generator of a module there, as `--families lab:hills` names it, goes to a worker and is found by it."""
+    (tmp_path / "hills_of_this_test.py").write_text("def hills(key):\n    return key\n")
+    monkeypatch.chdir(tmp_path)
+    family = find_family("hills_of_this_test:hills")
+    with local_cluster(1) as client:
+        assert client.submit(name_of, family).result(timeout=60) == "hills"
