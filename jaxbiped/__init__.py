@@ -15,7 +15,8 @@ lazy_package(
     {
         "api.study": "RandomArenas Scenes Study",
         "api.register": "register",
-        "api.run": "PlayedMission evaluate load play sweep",
+        "api.play": "PlayedMission play",
+        "api.run": "evaluate load sweep",
         "api.results": "Results",
         "api.stored": "compare",
         "api.plan": "plan",
@@ -42,4 +43,5 @@ lazy_package(
         "planning.ways": "cells_along free_cells",
         "sensing.view": "View",
     },
+    modules="arenas geometry mapping mission motion physics planning report sensing study testing",
 )

@@ -1,12 +1,23 @@
 """The public names for type checkers; `__init__.py` loads them when they are used. A test compares the two."""
 
+from jaxbiped import arenas as arenas
+from jaxbiped import geometry as geometry
+from jaxbiped import mapping as mapping
+from jaxbiped import mission as mission
+from jaxbiped import motion as motion
+from jaxbiped import physics as physics
+from jaxbiped import planning as planning
+from jaxbiped import report as report
+from jaxbiped import sensing as sensing
+from jaxbiped import study as study
+from jaxbiped import testing as testing
 from jaxbiped.api.plan import plan as plan
+from jaxbiped.api.play import PlayedMission as PlayedMission
+from jaxbiped.api.play import play as play
 from jaxbiped.api.register import register as register
 from jaxbiped.api.results import Results as Results
-from jaxbiped.api.run import PlayedMission as PlayedMission
 from jaxbiped.api.run import evaluate as evaluate
 from jaxbiped.api.run import load as load
-from jaxbiped.api.run import play as play
 from jaxbiped.api.run import sweep as sweep
 from jaxbiped.api.stored import compare as compare
 from jaxbiped.api.study import RandomArenas as RandomArenas

@@ -191,7 +191,7 @@ class Results:
         Raises:
           InputError: a strategy, arena or point that is not there; a strategy whose code is not what it was.
         """
-        from jaxbiped.api.run import PlayedMission
+        from jaxbiped.api.play import PlayedMission
         from jaxbiped.study.again import play_again
         from jaxbiped.study.manifest import Manifest
 

@@ -1,32 +1,23 @@
-"""The functions of a sweep script: studies are evaluated, single missions played."""
+"""The functions of a sweep script that evaluate studies, and read them again."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
-import jax
 import polars as pl
 
 from jaxbiped.api.register import named
 from jaxbiped.api.results import Results
 from jaxbiped.api.study import Study
-from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.scene import load_scene
 from jaxbiped.errors import InputError
-from jaxbiped.files import new_folder, write_whole
-from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.stepped import Mission, Played
-from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.mission.strategies import Strategy
 from jaxbiped.planning.planners import Planner
-from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study import store
 from jaxbiped.study.conduct import conduct, table
 from jaxbiped.study.evaluate import Progress
 from jaxbiped.study.evaluate import evaluate as evaluate_shards
-from jaxbiped.study.runner import check_mission, play_one, seeing
+from jaxbiped.study.runner import check_mission
 
 
 def evaluate(
@@ -90,88 +81,3 @@ def load(folder: str | Path, own: Sequence[Strategy | Planner] = ()) -> Results:
     """
     frame, manifest = store.read(folder)
     return Results(frame, store.read_points(folder), manifest.config, Path(folder), tuple(map(named, own)))
-
-
-@dataclass(frozen=True)
-class PlayedMission:
-    """One mission that has ended, with its log."""
-
-    name: str  # of the scene
-    strategy: str
-    mission: Mission
-
-    @property
-    def code(self) -> str:
-        """How it ended: "reached", say."""
-        return self.mission.code.label
-
-    @property
-    def distance(self) -> float:
-        """[m] walked."""
-        return self.mission.distance
-
-    @property
-    def time(self) -> float:
-        """[s] taken."""
-        return self.mission.time
-
-    @property
-    def log(self):
-        """Maps, poses and plans of every decision (`MissionLog`)."""
-        return self.mission.log
-
-    def __str__(self) -> str:
-        minutes = self.time / 60
-        return (
-            f"{self.name}, {self.strategy}: {self.code.replace('_', ' ')}, {100 * self.distance:.0f} cm in "
-            f"{self.time:.0f} s ({minutes:.1f} min), {self.mission.measurements} measurements"
-        )
-
-    def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write `map.png`, `mission.gif`, `mission.json` and the log into a new folder; the files.
-
-        Raises:
-          InputError: a folder that exists or cannot be written.
-        """
-        from jaxbiped.mission.pose_error import pose_facts
-        from jaxbiped.mission.recording import FILE, save_log
-        from jaxbiped.report.animation import save_gif
-        from jaxbiped.report.pictures import save_mission
-
-        facts = {"scene": self.name, "strategy": self.strategy, "code": self.code, "distance": self.distance}
-        facts |= {"time": self.time, "measurements": self.mission.measurements} | pose_facts(self.log)
-        with new_folder(Path(folder)) as new:
-            save_mission(new / "map.png", self.log, title=str(self))
-            save_gif(new / "mission.gif", self.log, title=f"{self.name}, {self.strategy}")
-            text = json.dumps(facts, indent=2) + "\n"
-            write_whole(new / "mission.json", lambda file: file.write(text.encode()))
-            save_log(new / FILE, self.log, facts)
-        return tuple(sorted(Path(folder).iterdir()))
-
-
-def play(
-    scene: str | Path | Arena,
-    strategy: str | Strategy | Planner = "full",
-    mission: MissionConfig | None = None,
-    *,
-    seed: int = 0,
-    on_decision: Callable[[Played], None] = lambda _: None,
-) -> PlayedMission:
-    """One mission in a scene, with a log of everything.
-
-    Consumes `jax.random.key(seed)`.
-
-    Args:
-      scene: a TOML file, or an arena.
-      strategy: a name, or a strategy, planner or function of your own.
-
-    Raises:
-      InputError: a scene that is wrong, a strategy that is not known, something that cannot be run on this machine.
-    """
-    name, arena = ("arena", scene) if isinstance(scene, Arena) else load_scene(scene)
-    config = MissionConfig() if mission is None else mission
-    chosen = find_strategy(strategy) if isinstance(strategy, str) else named(strategy)
-    check_mission(config)
-    with seeing(config) as eyes:
-        played = play_one(arena, config, chosen, from_key(jax.random.key(seed)), on_decision, eyes)
-    return PlayedMission(name, chosen.name, played)

@@ -9,12 +9,13 @@ from types import ModuleType
 from typing import Any
 
 
-def lazy_package(package: str, public: Mapping[str, str]) -> None:
+def lazy_package(package: str, public: Mapping[str, str], modules: str = "") -> None:
     """Give a package its public names and its `__all__`: each is imported at its first use, by any thread.
 
     Args:
       package: its `__name__`.
       public: names by the module, in the package, that they come from; `old:new` for one that is called otherwise.
+      modules: those of its modules that may be reached by attribute without an import of their own.
     """
     origins = {}
     for module, names in public.items():
@@ -23,6 +24,7 @@ def lazy_package(package: str, public: Mapping[str, str]) -> None:
             origins[here or there] = module, there
     self = sys.modules[package]
     self.__dict__["origins_"] = origins
+    self.__dict__["modules_"] = frozenset(modules.split())
     self.__dict__["__all__"] = sorted(origins)
     self.__class__ = LazyPackage
 
@@ -32,6 +34,8 @@ class LazyPackage(ModuleType):
 
     def __getattr__(self, name: str) -> Any:
         origin = self.__dict__["origins_"].get(name)
+        if name in self.__dict__["modules_"]:
+            return importlib.import_module(f"{self.__name__}.{name}")
         if origin is None:
             raise AttributeError(f"module {self.__name__!r} has no attribute {name!r}")
         module, there = origin
@@ -47,4 +51,6 @@ class LazyPackage(ModuleType):
         super().__setattr__(name, value)
 
     def __dir__(self) -> list[str]:
-        return sorted({*self.__dict__, *self.__dict__["origins_"]} - {"origins_"})
+        return sorted(
+            {*self.__dict__, *self.__dict__["origins_"], *self.__dict__["modules_"]} - {"origins_", "modules_"}
+        )

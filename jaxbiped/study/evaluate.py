@@ -149,7 +149,7 @@ def run_all(
     static: Program,
     on_progress: OnProgress,
     workers: int = WORKERS,
-    slots: int | None = None,
+    slots: int = SLOTS,
     population_of: Int[np.ndarray, "P"] | None = None,
     devices: Sequence[jax.Device] | None = None,
 ) -> Result:
@@ -160,7 +160,8 @@ def run_all(
 
     Args:
       batch: [A], or [U * A] where there are `U` populations.
-      slots: of each queue; by default `SLOTS`, or less for few jobs, whatever the number of queues.
+      slots: of each queue. XLA fuses a program by its sizes, and what it fuses otherwise may round otherwise: rows are
+        the same, bit for bit, among runs of as many slots, so that few jobs have as many as many do.
       population_of: which of these each point is about; by default the first.
       devices: by default all of this process.
     """
@@ -171,8 +172,8 @@ def run_all(
     arena, point = np.concatenate([arena[real], arena[~real]]), np.concatenate([point[real], point[~real]])
     devices = devices or jax.local_devices()
     queues = len(devices) if len(devices) > 1 else max(1, min(workers, count * kinds))
-    length = -(-size * kinds // queues)
-    slots = slots or min(SLOTS, -(-size * kinds // WORKERS))
+    length = max(2, -(-size * kinds // queues))
+    batch, points = at_least_two(batch), at_least_two(points)
     hands = []
     for number in range(queues):
         mine = np.arange(number, size * kinds, queues)
@@ -195,6 +196,11 @@ def run_all(
         for all_rows, rows in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):
             all_rows[point[mine], arena[mine]] = rows[: len(mine)]
     return out
+
+
+def at_least_two(tree):
+    """The tree, with its only row twice where it has but one: XLA makes another program of one arena or one setting."""
+    return jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf]) if leaf.shape[0] == 1 else leaf, tree)
 
 
 def run_threads(

@@ -28,6 +28,12 @@ def test_importing_it_loads_no_heavy_library():
     assert found.stdout == "[]\n"
 
 
+def test_parts_are_reached_without_an_import_of_their_own():
+    code = "import jaxbiped as jb; print(jb.testing.tiny_mission.__name__, jb.planning.field.__name__)"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout == "tiny_mission field\n"
+
+
 def step_costs(cells):
     """By Eq. 1 on level floor: C0 for each cell, C1 for each move."""
     return sum(np.hypot(*step) + 1 for step in np.diff(cells, axis=0))
