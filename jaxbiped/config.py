@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import inspect
+import itertools
 import json
 import re
+import textwrap
 import tomllib
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
@@ -19,10 +23,24 @@ from jaxbiped.files import read_text
 class Model(pydantic.BaseModel):
     """Base of every configuration model: frozen, no unknown keys, no NaN or infinity."""
 
-    model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True)
+    model_config = pydantic.ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 M = TypeVar("M", bound=Model)
+
+
+def field_docs(model: type[Model]) -> dict[str, str]:
+    """The docstring of each field that has one. It is read from the source, which takes long: for help alone."""
+    found = {}
+    for kind in reversed(inspect.getmro(model)):
+        if not issubclass(kind, Model):
+            continue
+        (made,) = ast.parse(textwrap.dedent(inspect.getsource(kind))).body
+        for field, text in itertools.pairwise(made.body):
+            if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
+                found[field.target.id] = inspect.cleandoc(text.value.value)
+    return found
+
 
 # What pydantic found wrong, by its name for that, in our words; fields are of its context.
 SAID = {

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, Protocol, runtime_checkable
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pydantic
@@ -157,8 +158,8 @@ def to_arena(scene: SceneConfig) -> Arena:
     for m, box in enumerate(scene.boxes):
         half_x, half_y = box.size[0] / 2, box.size[1] / 2
         rows[:, m] = (*box.centre, box.yaw, half_x, half_y, box.bottom, box.top, box.contrast)
-    x, y, yaw, half_x, half_y, bottom, top, contrast = map(jnp.asarray, rows)
-    used = jnp.arange(slots) < len(scene.boxes)
+    x, y, yaw, half_x, half_y, bottom, top, contrast = rows
+    used = np.arange(slots) < len(scene.boxes)
     boxes = Boxes(x, y, yaw, half_x, half_y, bottom, top, bottom > 0, contrast, used)
     slots = max(len(LANDMARKS_X), len(scene.landmarks))
     marks = np.zeros((3, slots), np.float32)
@@ -166,17 +167,18 @@ def to_arena(scene: SceneConfig) -> Arena:
     for n, mark in enumerate(scene.landmarks):
         marks[:, n] = (*mark.at, mark.yaw)
         kind[n] = CIRCLE if mark.kind == "circle" else SQUARE
-    used = jnp.arange(slots) < len(scene.landmarks)
-    return Arena(
-        size_xy=jnp.array(scene.size, jnp.float32),
+    used = np.arange(slots) < len(scene.landmarks)
+    arena = Arena(
+        size_xy=np.array(scene.size, np.float32),
         boxes=boxes,
-        landmarks=Landmarks(*map(jnp.asarray, marks), jnp.asarray(kind), used),
-        start_xyyaw=jnp.array(scene.start, jnp.float32),
-        goal_xy=jnp.array(scene.goal, jnp.float32),
-        floor_contrast=jnp.float32(scene.floor_contrast),
-        family=jnp.int32(-1),
-        difficulty=jnp.float32(0.0),
+        landmarks=Landmarks(*marks, kind, used),
+        start_xyyaw=np.array(scene.start, np.float32),
+        goal_xy=np.array(scene.goal, np.float32),
+        floor_contrast=np.float32(scene.floor_contrast),
+        family=np.int32(-1),
+        difficulty=np.float32(0.0),
     )
+    return jax.device_put(arena)
 
 
 def _check(scene: SceneConfig, path: str | Path, terrain: HeightField | None) -> None:

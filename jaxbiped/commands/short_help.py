@@ -16,7 +16,7 @@ import pydantic
 import tyro
 
 from jaxbiped.commands.options.base import Options
-from jaxbiped.config import Model
+from jaxbiped.config import Model, field_docs
 
 SHORT, ALL = ("-h", "--help"), "--help-all"
 WIDEST = 120  # [columns] of a description
@@ -69,7 +69,7 @@ def basic(options: type[Options], known: Model | None = None) -> type[Model]:
             default = ...
         else:
             default = getattr(default, name) if default else field.get_default(call_default_factory=True)
-        text = first_sentence(field.description or "")
+        text = first_sentence(field_docs(model).get(name, ""))
         shown = Annotated[hint, as_shown(hint, text)]
         if default is False:
             shown = Annotated[shown, tyro.conf.FlagCreatePairsOff]  # --no-... changes nothing

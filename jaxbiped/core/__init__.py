@@ -1,1 +1,5 @@
 """What all rooms share."""
+
+from jaxbiped.core.lazy_package import lazy_package
+
+lazy_package(__name__, {})

@@ -29,6 +29,18 @@ def lazy_package(package: str, public: Mapping[str, str], modules: str = "") -> 
     self.__class__ = LazyPackage
 
 
+REPLACED: set[str] = set()  # what was replaced in modules of such packages since they were loaded
+
+
+class WatchedModule(ModuleType):
+    """A module that tells when somebody replaces what is in it: programs that were traced before are then others."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if not isinstance(value, ModuleType) and not name.startswith("__"):
+            REPLACED.add(f"{self.__name__}.{name}")
+        super().__setattr__(name, value)
+
+
 class LazyPackage(ModuleType):
     """See `lazy_package`."""
 
@@ -46,6 +58,10 @@ class LazyPackage(ModuleType):
     def __setattr__(self, name: str, value: Any) -> None:
         """Where a module and a function of it have one name, that is the function: importing sets the module."""
         module, there = self.__dict__["origins_"].get(name, (None, None))
+        if type(value) is ModuleType and value.__name__ == f"{self.__name__}.{name}":
+            value.__class__ = WatchedModule
+        elif not isinstance(value, ModuleType) and not name.startswith("__"):
+            REPLACED.add(f"{self.__name__}.{name}")
         if module == name and isinstance(value, ModuleType):
             value = getattr(value, there)
         super().__setattr__(name, value)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import threading
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from jaxbiped.core.cache_folder import MOST_PROGRAMS, PROGRAMS, cache_folder
 
 KIND = b"jaxbiped program 1\n"
 QUICK = 0.05  # [s] of compiling: what takes less is compiled again
+LAST = threading.local()  # its `value`: what this thread read or wrote last
 SHARE = 16  # so many files are written between two looks at their sizes
 
 
@@ -58,12 +60,14 @@ def kind_of_cache(compilation_cache, interface: type) -> type:
             if chosen := self.chosen():
                 return chosen.get(key)
             folder = program_folder()
-            return kept_files.read(folder / key, KIND) if folder else None
+            LAST.value = kept_files.read(folder / key, KIND) if folder else None
+            return LAST.value
 
         def put(self, key: str, value: bytes) -> None:
             if chosen := self.chosen():
                 chosen.put(key, value)
             elif folder := program_folder():
+                LAST.value = value
                 kept_files.write(folder / key, KIND, value)
                 if self.written % SHARE == 0:
                     kept_files.prune(folder.parent, MOST_PROGRAMS)

@@ -1,5 +1,5 @@
 """Other people's files."""
 
-from jaxbiped.formats.elevation import Elevation, load_elevation, save_elevation
+from jaxbiped.core.lazy_package import lazy_package
 
-__all__ = ["Elevation", "load_elevation", "save_elevation"]
+lazy_package(__name__, {"elevation": "Elevation load_elevation save_elevation"})

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Annotated
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pydantic
 from jaxtyping import Array, Float
@@ -131,7 +130,7 @@ class LibraryConfig(Model):
         entries = [self.primitives[name] for name in PLAYED]
         windows = [self.primitives[name].window for name in STEPS]
         covariances = np.array([entry.covariance for entry in entries]) + SMALLEST * np.eye(3)
-        single = lambda values: jnp.asarray(np.asarray(values), jnp.float32)  # noqa: E731
+        single = lambda values: jax.device_put(np.asarray(values, np.float32))  # noqa: E731
         return Library(
             request=single([entry.request for entry in entries]),
             bias=single([np.subtract(entry.displacement, entry.request) for entry in entries]),

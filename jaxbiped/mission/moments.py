@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -11,6 +9,7 @@ from jaxtyping import Array, Bool, Float
 
 from jaxbiped import planning
 from jaxbiped.arenas.arena import CIRCLE, Arena
+from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.geometry.pose import to_world
 from jaxbiped.mapping import level_view
 from jaxbiped.mapping.cobstacles import occupied_levels
@@ -23,23 +22,25 @@ from jaxbiped.mission.state import World
 def moment(world: World, thought: Thought, settings: Settings, program: Program, action: str) -> dict:
     """What a log keeps of one decision."""
     points, counts, voxels = jax.device_get(as_mapped(thought, settings, program))
+    plan = planned_way(thought, settings, program)
+    world, pose, seen, measuring = jax.device_get((world, thought.pose, thought.landmarks, settings.durations.measure))
     return {
-        "classes": np.asarray(thought.classes[0]),
-        "levels": np.asarray(thought.levels[0]),
+        "classes": np.asarray(thought.classes)[0],
+        "levels": np.asarray(thought.levels)[0],
         "true_xyyaw": pose_of(world),
-        "estimated_xyyaw": np.array([float(v[0]) for v in (thought.pose.x, thought.pose.y, thought.pose.yaw)]),
-        "plan": planned_way(thought, settings, program),
-        "time": float(world.time[0] + settings.durations.measure),
+        "estimated_xyyaw": np.array([float(v[0]) for v in (pose.x, pose.y, pose.yaw)]),
+        "plan": plan,
+        "time": float(np.float32(world.time[0]) + np.float32(measuring)),
         "action": action,
         "z": float(world.pose.z[0]),
         "squat": bool(world.squat[0]),
-        "seen": int(np.asarray(thought.landmarks[0]).sum()),
+        "seen": int(seen[0].sum()),
         "points": points[counts],
         "voxels": voxels,
     }
 
 
-@partial(jax.jit, static_argnames=("program",))
+@ready_jit(static_argnames=("program",))
 def as_mapped(
     thought: Thought, settings: Settings, program: Program
 ) -> tuple[Float[Array, "N 3"], Bool[Array, "N"], Bool[Array, "H W Z"]]:
@@ -75,8 +76,8 @@ def nothing(world: World, program: Program) -> dict:
         "plan": np.zeros((0, 2)),
         "time": 0.0,
         "action": "Start",
-        "z": float(world.pose.z[0]),
-        "squat": bool(world.squat[0]),
+        "z": float(np.asarray(world.pose.z)[0]),
+        "squat": bool(np.asarray(world.squat)[0]),
         "seen": 0,
         "points": np.zeros((0, 3), np.float32),
         "voxels": np.zeros((*program.spec.shape, program.spec.levels + program.spec.lowest), bool),
@@ -85,29 +86,29 @@ def nothing(world: World, program: Program) -> dict:
 
 def pose_of(world: World) -> Float[np.ndarray, "3"]:
     """True (x, y, yaw) of the only mission of a batch."""
-    return np.array([float(v[0]) for v in (world.pose.x, world.pose.y, world.pose.yaw)])
+    return np.array([float(np.asarray(v)[0]) for v in (world.pose.x, world.pose.y, world.pose.yaw)])
 
 
 def mind_pose(mind) -> Float[np.ndarray, "3"]:
     """Believed (x, y, yaw) of the only mission of a batch."""
     pose = mind.belief.pose
-    return np.array([float(v[0]) for v in (pose.x, pose.y, pose.yaw)])
+    return np.array([float(np.asarray(v)[0]) for v in (pose.x, pose.y, pose.yaw)])
 
 
 def planned_way(thought: Thought, settings: Settings, program: Program) -> Float[np.ndarray, "n 2"]:
     """Cell centres [m] of the planned path, from the robot's cell on; empty where there is none."""
     spec = program.spec
-    moves = np.asarray(way(thought, settings)[0])
+    moves = np.asarray(way(thought, settings))[0]
     moves = moves[: np.argmax(moves < 0)] if np.any(moves < 0) else moves
     if len(moves) == 0:
         return np.zeros((0, 2))
-    cells = np.asarray(thought.problem.start_ij[0]) + np.vstack(
+    cells = np.asarray(thought.problem.start_ij)[0] + np.vstack(
         [np.zeros((1, 2), int), np.cumsum(planning.DIRECTIONS[moves], axis=0)]
     )
     return (cells[:, ::-1] + 0.5) * spec.pitch
 
 
-@jax.jit
+@ready_jit
 def way(thought: Thought, settings: Settings):
     """Moves of the planned path, of which `decide` reads the first."""
     return settings.planner.whole_way(thought.problem, thought.route)

@@ -16,6 +16,7 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped import planning
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.movers import only
+from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Body, Cell, truth_grid
 from jaxbiped.mission.decision import nearest_direction
@@ -35,7 +36,7 @@ class OraclePlan:
 
 
 @with_own_settings
-@partial(jax.jit, static_argnames=("program",))
+@ready_jit(static_argnames=("program",))
 def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePlan:
     """Plans on the true class grid of each arena [A], under each of the settings [P].
 

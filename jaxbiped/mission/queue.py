@@ -19,6 +19,7 @@ from jax.sharding import Mesh
 from jaxtyping import Array, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.ready_programs import ready
 from jaxbiped.devices import ALL, EACH, on_each, placed
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.cycle import cycle
@@ -136,8 +137,15 @@ def compile_queue(
             begun = on_each(on_row(begun, 2), mesh, (ALL, ALL, EACH))
             turned = on_each(on_row(turned, 0, 3), mesh, (EACH, ALL, ALL, EACH), donate_argnums=0)
         queue = jax.eval_shape(begun, arenas, settings, jobs)
-        lowered = begun.lower(arenas, settings, jobs), turned.lower(queue, arenas, settings, jobs)
-        COMPILED[signature] = lowered[0].compile(), wide(lowered[1])
+        first, further = (arenas, settings, jobs), (queue, arenas, settings, jobs)
+        if mesh is None:
+            static = program, slots, TURNS
+            COMPILED[signature] = (
+                ready("fill", first, static, lambda: begun.lower(*first)),
+                ready("segment", further, static, lambda: turned.lower(*further), wide),
+            )
+        else:
+            COMPILED[signature] = begun.lower(*first).compile(), wide(turned.lower(*further))
     first, further = COMPILED[signature]
 
     @with_own_settings

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -12,6 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float, UInt32
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import Thought
@@ -55,10 +55,10 @@ class Mission:
     log: MissionLog = field(repr=False)
 
 
-turn_once = partial(jax.jit, static_argnames=("program",))(cycle)
+turn_once = ready_jit(cycle, static_argnames=("program",))
 
 
-@partial(jax.jit, static_argnames=("program",))
+@ready_jit(static_argnames=("program",))
 def begin_once(arena: Arena, settings: Settings, seed: UInt32[Array, ""], program: Program):
     """Arena and settings with a leading axis of 1, and world and mind before the first measurement."""
     begun = start(arena, settings, seed, program.spec, program.localisation)
@@ -94,7 +94,7 @@ def run_bare(
 ) -> World:
     """The end of one mission (no batch axis); its world has a leading axis of 1."""
     batch, (world, mind) = begin_once(arena, settings, seed, program)
-    while world.code[0] == Code.RUNNING:
+    while np.asarray(world.code)[0] == Code.RUNNING:
         before = world
         seen = eyes.see(world, mind, *batch) if eyes else None
         world, mind, _, command, thought = turn_once(world, mind, *batch, program, seen)
@@ -133,7 +133,7 @@ class Recorder:
 
     def concluded(self, _: int, world: World, mind: Mind) -> None:
         """What came of it."""
-        command = self.command
+        command, world = jax.device_get((self.command, world))
         record = Played(
             name=NAMES[Primitive(int(command.primitive[0]))],
             turn=float(command.turn[0]),

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 import jax
@@ -18,6 +18,7 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped.core.batching import fold, folding_vmap, unfold, without_gradient
 from jaxbiped.core.checks import cells, leading_shape, reals
 from jaxbiped.core.program_cache import keep_programs
+from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.devices import by_rows, cores, mesh_of
 from jaxbiped.errors import InputError
 from jaxbiped.planning import compiled, wavefront
@@ -107,7 +108,7 @@ def _differentiated(solve, method: str):
     return without_gradient(folding_vmap(lambda inputs: solve(inputs, method)), NO_GRADIENT)
 
 
-@partial(jax.jit, static_argnums=1)
+@ready_jit(static_argnames=("method",))
 def _cost_to_go(inputs, method: str) -> CostToGo:
     def chunk(edges, goal):
         valid = (edges >= 0).all((1, 2, 3))  # False for NaN as well
@@ -118,7 +119,7 @@ def _cost_to_go(inputs, method: str) -> CostToGo:
     return _by_chunks(chunk, inputs)
 
 
-@partial(jax.jit, static_argnums=1)
+@ready_jit(static_argnames=("method",))
 def _field(inputs, method: str) -> CostToGo:
     if method == "line_sweep":
         return _from_grids(*inputs)

@@ -17,6 +17,7 @@ from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
 from jaxbiped.arenas.source import OwnFamily, draw_arena, name_of
+from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.devices import by_rows, mesh_of
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
@@ -112,7 +113,7 @@ def compute(
 
 
 @with_own_settings
-@partial(jax.jit, static_argnames=("families",))
+@ready_jit(static_argnames=("families",))
 def draw(
     key: PRNGKeyArray,
     index: Int[Array, "A"],

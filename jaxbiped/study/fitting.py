@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.config import field_docs
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.eyes import StereoEyes, where
 from jaxbiped.mission.settings import MissionConfig, Settings, program
@@ -170,10 +171,10 @@ def sensor_toml(fit: Fit, heading: Sequence[str]) -> str:
     """A sensor file, with what each number means."""
     lines = [f"# {line}" for line in heading]
     for name in ("stereo", "landmarks", "rays"):
-        part = getattr(fit.sensor, name)
+        part, docs = getattr(fit.sensor, name), field_docs(type(getattr(fit.sensor, name)))
         lines += ["", f"[{name}]"]
         known = part.model_dump(exclude_none=True)
         values = {field: f"{field} = {value if name == 'rays' else float(value)!r}" for field, value in known.items()}
         width = max(map(len, values.values())) + 2
-        lines += [f"{text:<{width}}# {type(part).model_fields[field].description}" for field, text in values.items()]
+        lines += [f"{text:<{width}}# {docs[field]}" for field, text in values.items()]
     return "\n".join(lines) + "\n"

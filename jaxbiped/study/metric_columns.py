@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.metric import MissionEnd, begun, numbers_at_end
 from jaxbiped.mission.oracle import OraclePlan
@@ -80,7 +81,7 @@ def check_metrics(batch: Arena, group: Group, size: int) -> None:
 CHECKED: set = set()  # structures and shapes that have been looked at
 
 
-@jax.jit
+@ready_jit
 def at_ends(arenas: Arena, settings: Settings, results: Result, plans: OraclePlan) -> tuple:
     """(value, valid) [P, A] of each metric."""
 

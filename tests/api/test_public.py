@@ -107,4 +107,6 @@ def test_type_checkers_see_the_same_names():
             seen |= {alias.asname: (node.module.removeprefix("jaxbiped."), alias.name) for alias in node.names}
         if isinstance(node, ast.Assign):  # of what is called otherwise where it comes from
             seen[node.targets[0].id] = seen.pop(node.value.id)
+    modules = vars(jb)["modules_"]
+    assert {name: seen.pop(name) for name in modules} == {name: ("jaxbiped", name) for name in modules}
     assert seen == origins and Path(jb.__file__).with_name("py.typed").exists()

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from numba import njit
 
+from jaxbiped.core.ready_programs import TARGETS
 from jaxbiped.planning.compiled import foreign
 from jaxbiped.planning.costs import DIRECTIONS
 
@@ -69,6 +70,7 @@ def solve(arguments, count, results):
 @cache
 def registered() -> str:
     """The name by which XLA knows the kernel; compiled at the first call."""
+    TARGETS[NAME] = __name__, ()
     foreign.register(NAME, solve, keep=True)
     return NAME
 

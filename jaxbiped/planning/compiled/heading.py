@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from numba import carray, njit
 
+from jaxbiped.core.ready_programs import TARGETS
 from jaxbiped.planning.compiled import foreign
 from jaxbiped.planning.compiled import heading_sweep as sweep
 from jaxbiped.planning.costs import DIRECTIONS
@@ -91,6 +92,7 @@ def solve(arguments, count, results):
 def registered(method: str) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
     name = f"jaxbiped_heading_{method}"
+    TARGETS[name] = __name__, (method,)
     foreign.register(name, solve if method == "dijkstra" else sweep.solver(), keep=True)
     return name, 1 if method == "dijkstra" else sweep.LANES
 

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from numba import carray, njit
 
+from jaxbiped.core.ready_programs import TARGETS
 from jaxbiped.planning.compiled import dijkstra, foreign, grids, line_sweep
 from jaxbiped.planning.compiled.line_sweep import LANES
 from jaxbiped.planning.compiled.names import METHODS as METHODS
@@ -78,6 +79,7 @@ LOCK = Lock()
 def registered(kernel: str) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
     name, lanes = f"jaxbiped_{kernel}", 1 if kernel == "dijkstra" else LANES
+    TARGETS[name] = __name__, (kernel,)
     if kernel == GRIDS:
         foreign.register(name, grids.solver(), keep=True)
     else:

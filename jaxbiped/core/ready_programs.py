@@ -1,0 +1,266 @@
+"""Compiled programs on disk, found without tracing them: the second process to run a program loads it in milliseconds.
+
+XLA's own cache (`core.program_cache`) is keyed by the lowered program, and to trace and lower one takes seconds. Here
+the key is what a program is traced from: the text of this package, its function, what is static, the shapes and types
+of its arguments, JAX's settings, the versions of JAX and XLA and the kind of processor. So it is used only where that
+is all: on one device, outside of other traces, where every type of the arguments and everything static is of this
+package or plain, and where nobody has replaced anything in a module of it. Programs that call back into Python are
+traced anew, since what they call is known by numbers of one process. `jax.jit` stands in everywhere else.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import enum
+import functools
+import hashlib
+import importlib
+import inspect
+import io
+import os
+import pickle
+import re
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import jax
+import jaxlib
+import numpy as np
+from jax._src import compilation_cache, config
+from jax._src.lib import xla_client
+from jax.experimental import serialize_executable
+
+from jaxbiped.core import kept_files
+from jaxbiped.core.cache_folder import MOST_PROGRAMS
+from jaxbiped.core.lazy_package import REPLACED
+from jaxbiped.core.program_cache import LAST, program_folder
+
+KIND = b"jaxbiped ready program 1\n"
+PACKAGE = Path(__file__).parents[1]
+OURS = "jaxbiped"
+PLAIN = bool | int | float | str | bytes | None
+
+Target = tuple[str, tuple]  # a module, and what its `registered` is called with
+TARGETS: dict[str, Target] = {}  # by the names that XLA knows kernels by
+CALLED = re.compile(r'custom_call_target="([^"]+)"')
+
+
+def ready_jit(function: Callable | None = None, *, static_argnames: tuple[str, ...] = ()) -> Callable:
+    """Decorator: `jax.jit`, with programs that are kept."""
+    if function is None:
+        return functools.partial(ready_jit, static_argnames=static_argnames)
+    signature = inspect.signature(function)
+    traced = tuple(name for name in signature.parameters if name not in static_argnames)
+    programs: dict[Any, Callable] = {}
+    jitted = jax.jit(function, static_argnames=static_argnames)
+
+    def from_parts(arguments: tuple, static: tuple):
+        return function(**dict(zip(traced, arguments, strict=True)), **dict(static))
+
+    from_parts.__name__ = from_parts.__qualname__ = function.__name__  # which names the program
+    apart = jax.jit(from_parts, static_argnums=1)
+
+    @functools.wraps(function)
+    def call(*args, **kwargs):
+        bound = signature.bind(*args, **kwargs)
+        bound.apply_defaults()
+        arguments = tuple(bound.arguments[name] for name in traced)
+        static = tuple((name, bound.arguments[name]) for name in static_argnames)
+        leaves, tree = jax.tree.flatten(arguments)
+        if not may_be_ready(leaves):
+            return jitted(*args, **kwargs)
+        key = tree, static, tuple(map(jax.typeof, leaves)), trace_settings()
+        program = programs.get(key)
+        if program is None:
+            program = programs[key] = (
+                ready(
+                    f"{function.__module__}.{function.__qualname__}",
+                    (arguments,),
+                    static,
+                    lambda: apart.lower(arguments, static),
+                )
+                or apart.lower(arguments, static).compile()
+            )
+        return program(arguments)
+
+    call.lower = jitted.lower
+    return call
+
+
+def ready(
+    name: str,
+    arguments: tuple,
+    static: Any,
+    lower: Callable[[], jax.stages.Lowered],
+    compile: Callable[[jax.stages.Lowered], jax.stages.Compiled] = lambda lowered: lowered.compile(),
+) -> jax.stages.Compiled:
+    """A compiled program, from the disk where it is kept there, else made, and kept where that may be.
+
+    Args:
+      name: of the traced function with all that is not in the other arguments.
+      arguments: positional ones of the program: arrays, or anything with a shape and type.
+      static: all else that the program depends on.
+      lower, compile: make it.
+    """
+    file = program_file(name, arguments, static)
+    if file is None:
+        return compile(lower())
+    found = load(file, arguments)
+    if found is None:
+        lowered, LAST.value = lower(), None
+        found = compile(lowered)
+        store(file, found, LAST.value)
+    return found
+
+
+def may_be_ready(leaves: list) -> bool:
+    """Whether arguments are arrays on the one device, or numbers."""
+    if jax.config.jax_disable_jit or len(jax.local_devices()) != 1:
+        return False
+    return not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
+
+
+def program_file(name: str, arguments: tuple, static: Any) -> Path | None:
+    """Where a program is kept; None for one that is not."""
+    folder = program_folder()
+    if folder is None or REPLACED or len(jax.local_devices()) != 1 or jax.config.jax_compilation_cache_dir:
+        return None
+    made = hashlib.sha256()
+    try:
+        for part in (name, *facts(), *described(arguments, traced=True), *described(static)):
+            made.update(part.encode() + b"\n")
+    except (NotOurs, OSError):
+        return None
+    return folder / f"ready-{made.hexdigest()[:40]}"
+
+
+def facts() -> tuple[str, ...]:
+    """What holds for all programs of this process."""
+    plain = [value for value in trace_settings() if isinstance(value, PLAIN | enum.Enum)]
+    return (*of_this_machine(), repr(plain), os.environ.get("XLA_FLAGS", ""))
+
+
+@cache
+def of_this_machine() -> tuple[str, ...]:
+    """What does not change while it runs."""
+    device = jax.local_devices()[0]
+    client = device.client
+    versions = jax.__version__, jaxlib.__version__, np.__version__, client.platform_version
+    return package_hash(), *versions, client.platform, device.device_kind
+
+
+@cache
+def package_hash() -> str:
+    """Of the text of this package, and of the data that come with it.
+
+    Raises:
+      OSError: where that cannot be read.
+    """
+    made = hashlib.sha256()
+    for file in sorted(PACKAGE.rglob("*")):
+        if file.suffix in (".py", ".toml"):
+            made.update(str(file.relative_to(PACKAGE)).encode() + b"\0" + file.read_bytes() + b"\0")
+    return made.hexdigest()
+
+
+def trace_settings() -> tuple:
+    """JAX's settings that change what is traced or compiled."""
+    return config.trace_context()
+
+
+class NotOurs(Exception):
+    """Something whose code or state this package does not know."""
+
+
+def described(value: Any, traced: bool = False) -> Iterator[str]:
+    """Texts that are the same for all values of which a program is the same.
+
+    Args:
+      traced: whether leaves are arguments of the program, of which it depends on shapes and types alone.
+
+    Raises:
+      NotOurs: for functions, and classes that are not of this package.
+    """
+    if value is None or (isinstance(value, PLAIN) and not traced):
+        yield repr(value)
+    elif isinstance(value, enum.Enum) and our(type(value)):
+        yield f"{type(value).__qualname__}.{value.name}"
+    elif isinstance(value, tuple | list):
+        yield f"{type(value).__name__} {len(value)}"
+        if type(value) not in (tuple, list) and not our(type(value)):
+            raise NotOurs
+        for item in value:
+            yield from described(item, traced)
+    elif type(value) is dict:
+        for key in sorted(value):
+            yield repr(key)
+            yield from described(value[key], traced)
+    elif dataclasses.is_dataclass(type(value)) and our(type(value)):
+        yield f"{type(value).__module__}.{type(value).__qualname__}"
+        for field in dataclasses.fields(value):
+            yield from described(getattr(value, field.name), traced and not field.metadata.get("static", False))
+    elif traced and hasattr(value, "shape") and hasattr(value, "dtype"):
+        weak = getattr(getattr(value, "aval", value), "weak_type", False)
+        yield f"{value.dtype} {tuple(value.shape)} {weak}"
+    elif traced and isinstance(value, bool | int | float):
+        yield type(value).__name__
+    else:
+        raise NotOurs
+
+
+def our(kind: type) -> bool:
+    """Whether a class is of this package."""
+    return kind.__module__.partition(".")[0] == OURS
+
+
+def load(file: Path, arguments: tuple) -> jax.stages.Compiled | None:
+    """A program that is kept; None where there is none, or it cannot be used."""
+    data = kept_files.read(file, KIND)
+    if data is None:
+        return None
+    try:
+        payload, skeleton, targets = pickle.loads(data)
+        for module, given in targets:
+            importlib.import_module(module).registered(*given)
+        trees = jax.tree.structure((arguments, {})), jax.tree.structure(skeleton)
+        return serialize_executable.deserialize_and_load(payload, *trees)
+    except Exception:  # of whatever kind: it is made anew, and this file replaced
+        return None
+
+
+def store(file: Path, program: jax.stages.Compiled, kept: bytes | None = None) -> None:
+    """Keep a program, where that is possible.
+
+    Args:
+      kept: its entry in JAX's cache. One that came from there cannot be written again: XLA leaves out a part.
+    """
+    called = set(CALLED.findall(program.as_text() or ""))
+    if not called <= set(TARGETS):  # Python functions, or libraries that are made ready when a program is traced
+        return
+    try:
+        tree = program.out_tree
+        skeleton = jax.tree.unflatten(tree, range(tree.num_leaves))
+        targets = [TARGETS[name] for name in sorted(called)]
+        data = pickle.dumps((written(program, kept), skeleton, targets), protocol=5)
+    except Exception:  # a program, or results, of a kind that cannot be kept
+        return
+    kept_files.write(file, KIND, data)
+    kept_files.prune(file.parent.parent, MOST_PROGRAMS)
+
+
+def written(program: jax.stages.Compiled, kept: bytes | None) -> bytes:
+    """As `serialize_executable.serialize`, from the entry in JAX's cache where there is one."""
+    if kept is None:
+        return serialize_executable.serialize(program)[0]
+    code, _ = compilation_cache.extract_executable_and_time(compilation_cache.decompress_executable(kept))
+
+    class Pickler(serialize_executable._JaxPjrtPickler):
+        def persistent_id(self, thing):
+            return ("exec", code) if isinstance(thing, xla_client.LoadedExecutable) else super().persistent_id(thing)
+
+    with io.BytesIO() as file:
+        unloaded = program._executable._unloaded_executable
+        Pickler(file).dump((unloaded, jax.tree.leaves(program.args_info), program._no_kwargs))
+        return file.getvalue()
