@@ -50,6 +50,7 @@ def settled() -> Iterator[None]:
     os.environ.update(SET)
     try:
         with warnings.catch_warnings():
+            warnings.showwarning = tell
             if os.environ.get("PYTHONWARNINGS"):
                 warnings.resetwarnings()  # "error" would make an error of what any library warns of
                 warnings.simplefilter("default")
@@ -61,6 +62,12 @@ def settled() -> Iterator[None]:
         for name in SET:
             os.environ.pop(name, None)
         os.environ.update({name: value for name, value in before.items() if value is not None})
+
+
+def tell(message: Warning | str, category: type[Warning], filename: str, lineno: int, file=None, line=None) -> None:
+    """As `warnings.showwarning`, in one line and without the line of code."""
+    text = " ".join(str(message).split())
+    print(f"jaxbiped: warning: {text}", file=sys.stderr if file is None else file)
 
 
 def check_matplotlibrc(file: Path) -> None:

@@ -15,11 +15,12 @@ from jaxtyping import Float, Int
 from jaxbiped.commands.map_source import MapSource, open_map
 from jaxbiped.commands.options.plan import PlanArgs
 from jaxbiped.commands.scenario import check_scenario
-from jaxbiped.config import config_hash
+from jaxbiped.config import config_hash, load
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.motion.config import RobotConfig
 from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, next_step
 from jaxbiped.terminal import legible
 
@@ -53,7 +54,7 @@ def main(args: PlanArgs) -> int:
     out = args.out or Path("results") / f"plan-{config_hash(identity)}"
     refuse_existing(out)
     check_options(args)
-    source = open_map(args.file, args.pitch, args.radius)
+    source = open_map(args.file, args.pitch, radius_of(args))
     if args.scenario is not None:
         return check_scenario(source, args.scenario, args.sample, out)
     start_ij = source.free_cell(args.start, "start")
@@ -70,6 +71,16 @@ def main(args: PlanArgs) -> int:
     return 0
 
 
+def radius_of(args: PlanArgs) -> float:
+    """[m] by which obstacles grow."""
+    if args.robot is None:
+        return args.radius
+    robot = load(RobotConfig, args.robot)
+    if args.radius:
+        raise InputError("goes without a --robot, whose radius is taken", field="radius", value=args.radius)
+    return robot.radius
+
+
 def check_options(args: PlanArgs) -> None:
     """Raise `InputError` unless the options go together."""
     if args.scenario is None:
@@ -79,7 +90,7 @@ def check_options(args: PlanArgs) -> None:
         if args.sample is not None:
             raise InputError("goes with a --scenario only", field="sample", value=args.sample)
         return
-    for name in ("start", "goal", "c0", "c1", "c2", "c3", "c4", "corner_cutting", "radius"):
+    for name in ("start", "goal", "c0", "c1", "c2", "c3", "c4", "corner_cutting", "radius", "robot"):
         if getattr(args, name) != PlanArgs.model_fields[name].default:
             message = "does not go with --scenario, whose lengths are octile and fix costs, corners and positions"
             raise InputError(message, field=name, value=getattr(args, name))

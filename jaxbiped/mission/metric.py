@@ -52,6 +52,7 @@ class Metric:
     scale: ClassVar[float] = 1.0  # from SI to that unit
     digits: ClassVar[int] = 2  # after the point
     smaller_is_better: ClassVar[bool] = True
+    of_servos: ClassVar[bool] = False  # whether its state is the work [J] of a simulated biped, which its driver writes
 
     def start(self, arena: Any, settings: Any) -> Any:
         """What it remembers before the first decision in an `Arena`."""

@@ -96,7 +96,30 @@ class MeasuringShare(Metric):
         return spent / jnp.where(some, end.result.time, 1.0), some
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Energy(Metric):
+    """[J] mechanical work of the servos of a simulated biped: force times velocity, summed over the engine's steps.
+
+    What a servo takes while it brakes is not got back, and heat is not counted. It is of the motions as they are played
+    (`walk.pace`), not of the clock. There is none where no biped is simulated.
+    """
+
+    unit, digits = "J", 1
+    of_servos = True
+
+    def start(self, arena, settings) -> Float[Array, ""]:
+        """See `Metric`."""
+        return jnp.full((), jnp.nan)
+
+    def result(self, state: Float[Array, ""], end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
+        """See `Metric`."""
+        there = jnp.isfinite(state)
+        return jnp.where(there, state, 0.0), there
+
+
 for _name, _metric in (
+    ("energy", Energy()),
     ("spl", PathEfficiency()),
     ("clearance", LeastClearance()),
     ("replans", Replans()),

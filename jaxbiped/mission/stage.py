@@ -75,6 +75,7 @@ class Stage:
             (2, size)
         )  # [m] where each stood, and the highest top that its feet may touch
         self.fell, self.collided, self.changed = np.zeros((3, size), bool)
+        self.work = np.zeros(size)  # [J] of all servos since each was placed, where the backend sums it up
         self.state = None
 
     def rest(self, squat: bool) -> Float64[np.ndarray, "1 12"]:
@@ -96,6 +97,7 @@ class Stage:
             qpos[s] = home_qpos(self.model, np.array(hips), q, yaw)
         self.state = self.backend.reset(mask, qpos)
         self.fell[mask], self.collided[mask] = False, False
+        self.work[mask] = 0.0
 
     def expect(self, s: int | np.integer, feet: Float64[np.ndarray, "4"], climb: float) -> None:
         """What a robot does next begins at (x, y, z, yaw), and may climb so high [m].
@@ -132,6 +134,7 @@ class Stage:
             self.backend.set_fields(self.fields, self.changed)
             self.changed[:] = False
         self.state = state = self.backend.advance(controls, mask=mask)
+        self.work += state.work.sum(axis=1)
         _, x, y, _ = state.qpos[:, 3:7].T
         upright = 1 - 2 * (x * x + y * y)
         tall = np.any(state.touched[:, 1:] & (self.tops > self.reach[:, None]), axis=1)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
 import jax
@@ -149,9 +150,8 @@ class Walkers:
         self.count = int(jobs.count)
         self.step, self.rise = np.asarray(settings.body.step), np.asarray(settings.limits.rise)
         size = max(1, min(config.slots, self.count))
-        self.stage = Stage(
-            program.executor, size, jax.device_get(arenas.boxes), config.biped, **config.options(program.executor)
-        )
+        options = config.options(program.executor) | {"work": any(metric.of_servos for metric in settings.metrics)}
+        self.stage = Stage(program.executor, size, jax.device_get(arenas.boxes), config.biped, **options)
         self.job, self.next_job = np.arange(size), size
         self.squat = np.zeros(size, bool)
         self.tapes = [self.stage.rest(False)] * size
@@ -250,6 +250,9 @@ class Walkers:
     def write(self, s: int | np.integer, world: World) -> None:
         """Write down how the mission of a slot ended."""
         job = self.job[s]
+        worked = np.float32(self.stage.work[s])
+        metrics = zip(self.settings.metrics, world.metrics, strict=True)
+        world = replace(world, metrics=tuple(worked if metric.of_servos else state for metric, state in metrics))
         last = ending(world, self.goals[self.arena_of[job]])
         for column, value in zip(jax.tree.leaves(self.result), jax.tree.leaves(last), strict=True):
             column[job] = value

@@ -51,6 +51,7 @@ class State:
     warnings: Int[np.ndarray, "B 8"]  # how often, by the names of WARNINGS
     touched: Bool[np.ndarray, "B W"]  # whether any pair of the watch did, in this slice
     depth: Float[np.ndarray, "B W"]  # [m] greatest penetration of the watch's pairs in this slice; 0: none
+    work: Float[np.ndarray, "B nw"]  # [J] that each actuator gave in this slice, braking not counted; nw = 0 or nu
 
 
 @jax.tree_util.register_dataclass
@@ -69,6 +70,7 @@ class Rollout:
     sensordata: Float[np.ndarray, "B R ns"]
     touched: Bool[np.ndarray, "B W"]  # in the whole rollout
     depth: Float[np.ndarray, "B W"]  # [m]
+    work: Float[np.ndarray, "B nw"]  # [J] in the whole rollout
 
 
 @runtime_checkable

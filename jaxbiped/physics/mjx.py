@@ -53,8 +53,8 @@ class Mjx:
 
     def __init__(self, model: Any, batch_size: int, options: Options):
         self.batch_size = inputs.size("batch_size", batch_size, most=inputs.MOST_SIMULATIONS)
-        self.model = load(model, free_joint=options.free_joint, watch=options.watch)
-        self.watched = Watched.of(self.model, options.watch)
+        self.model = load(model, free_joint=options.free_joint, watch=options.watch, work=options.work)
+        self.watched = Watched.of(self.model, options.watch, options.work)
         self.watches = self.watched.names
         self.options = options
         self.engine = Engine(self.model, self.batch_size, options.impl, options.device, options.contacts)
@@ -97,11 +97,11 @@ class Mjx:
         count = table.shape[1] * hold // every
         nq, nqv, width = self.model.nq, self.model.nq + self.model.nv, self.row_width()
         records = np.empty((self.batch_size, count, width), self.data.qpos.dtype)
-        warned, depth = self.unwarned(), self.untouched()
+        warned, depth, work = self.unwarned(), self.untouched(), self.no_work()
         overrides, waiting = self.overridden(self.scratch), None
         for begin, steps, block in self.blocks(table, hold):
-            data, warned, depth, rows = self.block(
-                self.engine.model, overrides, data, warned, depth, block, np.int32(steps)
+            data, warned, depth, work, rows = self.block(
+                self.engine.model, overrides, data, warned, depth, work, block, np.int32(steps)
             )
             # The device goes on with this block while the records of the one before are copied.
             self.collect(records, every, waiting)
@@ -117,6 +117,7 @@ class Mjx:
             warnings=warned,
             touched=depth >= 0,
             depth=np.maximum(depth, 0.0),
+            work=np.asarray(work),
         )
 
     def reset(self, mask: Any = None, qpos: Any = None, qvel: Any = None) -> State:
@@ -126,7 +127,7 @@ class Mjx:
         self.data = self.start(chosen, self.data, *start)
         self.warned = jnp.where(chosen[:, None], 0, self.warned)
         self.steps = np.where(chosen, 0, self.steps)
-        return self.state(self.untouched())
+        return self.state(self.untouched(), self.no_work())
 
     def set_fields(self, fields: Mapping[str, Any], mask: Any = None) -> None:
         """See `Backend.set_fields`."""
@@ -142,25 +143,26 @@ class Mjx:
         table = inputs.controls(controls, self.batch_size, self.model)
         steps, hold = inputs.every(table.shape[1], None, hold)
         chosen = inputs.chosen(mask, self.batch_size)
-        depth, data, warned = self.untouched(), self.data, self.warned
+        depth, work, data, warned = self.untouched(), self.no_work(), self.data, self.warned
         if self.overrides is None:
             self.overrides = self.overridden(self.living)
         for _, count, block in self.blocks(table, hold):
-            self.data, self.warned, depth, _ = self.block(
-                self.engine.model, self.overrides, self.data, self.warned, depth, block, np.int32(count)
+            self.data, self.warned, depth, work, _ = self.block(
+                self.engine.model, self.overrides, self.data, self.warned, depth, work, block, np.int32(count)
             )
         if not chosen.all():
-            others = (self.warned, warned), (depth, self.untouched())
-            self.data, self.warned, depth = self.keep(chosen, self.data, data, *others)
+            others = (self.warned, warned), (depth, self.untouched()), (work, self.no_work())
+            self.data, self.warned, depth, work = self.keep(chosen, self.data, data, *others)
         self.steps = self.steps + steps * chosen
-        return self.state(depth)
+        return self.state(depth, work)
 
     def compile(self) -> float:
         """See `Backend.compile`."""
         begin = time.perf_counter()
         block = np.zeros((self.options.block, self.batch_size, self.model.nu), np.float32)
         overrides, data = self.overridden(self.living), self.data
-        out = self.block(self.engine.model, overrides, data, self.warned, self.untouched(), block, np.int32(0))
+        before = self.warned, self.untouched(), self.no_work()
+        out = self.block(self.engine.model, overrides, data, *before, block, np.int32(0))
         jax.block_until_ready(out)
         return time.perf_counter() - begin
 
@@ -220,28 +222,33 @@ class Mjx:
         data: Any,
         warned: Int[Array, "B 8"],
         depth: Float[Array, "B W"],
+        work: Float[Array, "B nw"],
         controls: Float[Array, "L B nu"],
         steps: Int[Array, ""],
-    ) -> tuple[Any, Int[Array, "B 8"], Float[Array, "B W"], Float[Array, "L B row"]]:
-        """Step a batch `steps` times: its data, warnings, deepest contacts, and a record of each step."""
+    ) -> tuple[Any, Int[Array, "B 8"], Float[Array, "B W"], Float[Array, "B nw"], Float[Array, "L B row"]]:
+        """Step a batch `steps` times: its data, warnings, deepest contacts, work, and a record of each step."""
         self.traces += 1
 
-        def one(own: dict[str, Array], data: Any, control: Float[Array, "nu"]) -> tuple[Any, Array, Array, Array]:
-            data = self.engine.step(model, own, data, control)
-            row = jnp.concatenate([data.qpos, data.qvel, data.sensordata[: self.watched.own]])
-            return data, self.engine.flags(data), self.watched.depths(data.sensordata, jnp), row
+        def one(
+            own: dict[str, Array], data: Any, control: Float[Array, "nu"]
+        ) -> tuple[Any, Array, Array, Array, Array]:
+            data, sensed = self.engine.step(model, own, data, control), self.watched
+            row = jnp.concatenate([data.qpos, data.qvel, data.sensordata[: sensed.own]])
+            seen = sensed.depths(data.sensordata, jnp), sensed.power(data.sensordata, jnp)
+            return data, self.engine.flags(data), *seen, row
 
         def step(k: Array, carry: tuple) -> tuple:
-            data, warned, depth, rows = carry
+            data, warned, depth, work, rows = carry
             valid = ~jnp.any(warned, axis=1)
-            data, flags, touching, row = jax.vmap(one)(overrides, data, controls[k])
+            data, flags, touching, power, row = jax.vmap(one)(overrides, data, controls[k])
             warned = warned + flags * valid[:, None]  # its first warnings only, as with the engine in C
             valid = ~jnp.any(warned, axis=1)[:, None]
             depth = jnp.where(valid, jnp.maximum(depth, touching), depth)
-            return data, warned, depth, rows.at[k].set(jnp.where(valid, row, jnp.nan))
+            work = work + jnp.where(valid, power * model.opt.timestep, jnp.nan)
+            return data, warned, depth, work, rows.at[k].set(jnp.where(valid, row, jnp.nan))
 
         rows = jnp.zeros((controls.shape[0], self.batch_size, self.row_width()), data.qpos.dtype)
-        return jax.lax.fori_loop(0, steps, step, (data, warned, depth, rows))
+        return jax.lax.fori_loop(0, steps, step, (data, warned, depth, work, rows))
 
     def traced_start(self, mask: Array, data: Any, qpos: Float[Array, "B nq"], qvel: Float[Array, "B nv"]) -> Any:
         """The data of a batch with the simulations of a mask at the beginning."""
@@ -262,7 +269,7 @@ class Mjx:
         data = new.replace(**{name: choose(getattr(new, name), getattr(old, name)) for name in self.engine.initial()})
         return data, *(choose(a, b) for a, b in others)
 
-    def state(self, depth: Float[Array, "B W"]) -> State:
+    def state(self, depth: Float[Array, "B W"], work: Float[Array, "B nw"]) -> State:
         """A copy of the living batch as it is."""
         warned, depth = np.asarray(self.warned), np.asarray(depth)
         valid = ~warned.any(axis=1)
@@ -276,6 +283,7 @@ class Mjx:
             warnings=warned,
             touched=depth >= 0,
             depth=np.maximum(depth, 0.0),
+            work=np.asarray(work) + blank,
         )
 
     def row_width(self) -> int:
@@ -285,6 +293,11 @@ class Mjx:
     def unwarned(self) -> Int[Array, "B 8"]:
         """No warnings yet."""
         return jnp.zeros((self.batch_size, len(WARNINGS)), jnp.int32, device=self.engine.device)
+
+    def no_work(self) -> Float[Array, "B nw"]:
+        """None yet."""
+        shape = self.batch_size, len(self.watched.forces)
+        return jnp.zeros(shape, self.data.qpos.dtype, device=self.engine.device)
 
     def untouched(self) -> Float[Array, "B W"]:
         """No contacts yet."""

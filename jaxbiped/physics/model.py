@@ -21,7 +21,7 @@ REPORT = sum(1 << int(f) for f in (mujoco.mjtConDataField.mjCONDATA_FOUND, mujoc
 PREFIX = "watch/"  # of the sensors that watch contacts; they come after the model's own
 
 
-def load(source: Any, *, free_joint: bool = False, watch: Watches | None = None) -> mujoco.MjModel:
+def load(source: Any, *, free_joint: bool = False, watch: Watches | None = None, work: bool = False) -> mujoco.MjModel:
     """Compile a model.
 
     Args:
@@ -29,18 +29,23 @@ def load(source: Any, *, free_joint: bool = False, watch: Watches | None = None)
       free_joint: whether the model must have a free joint.
       watch: {name: pairs of geom names}: contacts to be watched. For each pair the model gets a contact sensor, after
         its own ones, so a `mujoco.MjModel` cannot be given.
+      work: whether the model gets sensors of each actuator's force and velocity, too.
 
     Raises:
       InputError: when it cannot be read, parsed or compiled, has no free joint, or lacks a watched geom.
     """
     file = None
     if isinstance(source, mujoco.MjModel):
-        if watch:
-            raise InputError("contacts are watched in MJCF or a mujoco.MjSpec, not in a compiled model", field="watch")
+        for field, wanted in (("watch", watch), ("work", work)):
+            if wanted:
+                message = "sensors are added to MJCF or a mujoco.MjSpec, not to a compiled model"
+                raise InputError(message, field=field)
         model = copy.copy(source)
     else:
         spec, file = read(source)
         add_watches(spec, watch or {})
+        if work:
+            add_power(spec)
         try:
             model = spec.compile()
         except ValueError as error:
@@ -85,21 +90,48 @@ def add_watches(spec: mujoco.MjSpec, watch: Watches) -> None:
             sensor.intprm[:3] = REPORT, 1, 1  # what it reports; the nearest; of one contact
 
 
+def add_power(spec: mujoco.MjSpec) -> None:
+    """Sensors of the force and the velocity of each actuator."""
+    for kind, sort in (
+        ("force", mujoco.mjtSensor.mjSENS_ACTUATORFRC),
+        ("velocity", mujoco.mjtSensor.mjSENS_ACTUATORVEL),
+    ):
+        for k, actuator in enumerate(spec.actuators):
+            actuator.name = actuator.name or f"{PREFIX}actuator/{k}"
+            sensor = spec.add_sensor(name=f"{PREFIX}{kind}/{k}", type=sort)
+            sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_ACTUATOR, actuator.name
+
+
 @dataclass(frozen=True)
 class Watched:
-    """Where the sensor data of a model is its own, and where it is of watched contacts."""
+    """Where the sensor data of a model is its own, and where it is of watched contacts and actuators."""
 
     own: int  # leading columns that are the model's own
     columns: tuple[int, ...]  # of each pair: found here, distance in the next
     group: tuple[int, ...]  # of each pair: the index of its watch
     names: tuple[str, ...]
+    forces: tuple[int, ...] = ()  # column of each actuator's force, where its work is wanted
+    velocities: tuple[int, ...] = ()  # and of its velocity
 
     @classmethod
-    def of(cls, model: mujoco.MjModel, watch: Watches) -> Watched:
+    def of(cls, model: mujoco.MjModel, watch: Watches, work: bool = False) -> Watched:
         """The layout of a model that `load` gave these watches."""
         pairs = [(i, f"{PREFIX}{name}/{k}") for i, name in enumerate(watch) for k in range(len(watch[name]))]
         columns = tuple(int(model.sensor(name).adr[0]) for _, name in pairs)
-        return cls(min(columns, default=model.nsensordata), columns, tuple(i for i, _ in pairs), tuple(watch))
+        forces, velocities = (
+            tuple(int(model.sensor(f"{PREFIX}{kind}/{k}").adr[0]) for k in range(model.nu if work else 0))
+            for kind in ("force", "velocity")
+        )
+        own = min((*columns, *forces), default=model.nsensordata)
+        return cls(own, columns, tuple(i for i, _ in pairs), tuple(watch), forces, velocities)
+
+    def power(self, sensordata: Any, xp: ModuleType) -> Any:
+        """[..., ns] -> [..., nu] W: what each actuator gives at the beginning of a step; 0 where it brakes.
+
+        Of no columns where work is not wanted.
+        """
+        forces, velocities = (np.array(columns, int) for columns in (self.forces, self.velocities))
+        return xp.maximum(sensordata[..., forces] * sensordata[..., velocities], 0.0)
 
     def depths(self, sensordata: Any, xp: ModuleType) -> Any:
         """[..., ns] -> [..., W] m: greatest penetration of each watch's pairs; -inf where none touches.

@@ -38,12 +38,12 @@ class Native:
 
     def __init__(self, model: Any, batch_size: int, options: Options):
         self.batch_size = inputs.size("batch_size", batch_size, most=inputs.MOST_SIMULATIONS)
-        self.model = load(model, free_joint=options.free_joint, watch=options.watch)
+        self.model = load(model, free_joint=options.free_joint, watch=options.watch, work=options.work)
         # A simulation that blew up must stay so, not start anew from its default with status 0.
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         for name in options.fields:
             inputs.field_name(self.model, name)
-        self.watched = Watched.of(self.model, options.watch)
+        self.watched = Watched.of(self.model, options.watch, options.work)
         self.watches = self.watched.names
         self.options = options
         self.living = Pool(self.model, self.batch_size, self.watched, options.threads)
@@ -68,7 +68,7 @@ class Native:
         pool = self.scratch
         pool.fields.only(values)
         pool.reset(np.ones(self.batch_size, bool), *start)
-        times, records, depth = pool.run(table, hold, every, np.ones(self.batch_size, bool))
+        times, records, depth, work = pool.run(table, hold, every, np.ones(self.batch_size, bool))
         nq, ns = 1 + self.model.nq, 1 + self.model.nq + self.model.nv
         return Rollout(
             time=times,
@@ -79,13 +79,14 @@ class Native:
             warnings=pool.warnings,
             touched=depth >= 0,
             depth=np.maximum(depth, 0.0),
+            work=work,
         )
 
     def reset(self, mask: Any = None, qpos: Any = None, qvel: Any = None) -> State:
         """See `Backend.reset`."""
         chosen = inputs.chosen(mask, self.batch_size)
         self.living.reset(chosen, *inputs.state(qpos, qvel, self.batch_size, self.model, chosen))
-        return self.living.state(np.full((self.batch_size, len(self.watches)), -np.inf))
+        return self.living.state(np.full((self.batch_size, len(self.watches)), -np.inf), self.living.no_work())
 
     def set_fields(self, fields: Mapping[str, Any], mask: Any = None) -> None:
         """See `Backend.set_fields`."""
@@ -97,8 +98,8 @@ class Native:
         """See `Backend.advance`."""
         table = inputs.controls(controls, self.batch_size, self.model)
         steps, hold = inputs.every(table.shape[1], None, hold)
-        _, _, depth = self.living.run(table, hold, steps, inputs.chosen(mask, self.batch_size))
-        return self.living.state(depth)
+        _, _, depth, work = self.living.run(table, hold, steps, inputs.chosen(mask, self.batch_size))
+        return self.living.state(depth, work)
 
     def compile(self) -> float:
         """See `Backend.compile`: nothing to do."""
@@ -150,16 +151,21 @@ class Pool:
 
     def run(
         self, controls: Float64[np.ndarray, "B T nu"], hold: int, every: int, mask: Bool[np.ndarray, "B"]
-    ) -> tuple[Float64[np.ndarray, "R"], Float64[np.ndarray, "B R row"], Float64[np.ndarray, "B W"]]:
+    ) -> tuple[
+        Float64[np.ndarray, "R"],
+        Float64[np.ndarray, "B R row"],
+        Float64[np.ndarray, "B W"],
+        Float64[np.ndarray, "B nw"],
+    ]:
         """Play a table in the simulations of a mask.
 
         Returns:
-          Record times, records (time, qpos, qvel, own sensors), and deepest contacts of the watches.
+          Record times, records (time, qpos, qvel, own sensors), deepest contacts of the watches, and work.
         """
         model, count, steps = self.model, len(controls), controls.shape[1] * hold
         width = 1 + model.nq + model.nv
         out = np.full((count, steps // every, width + self.watched.own), np.nan)
-        depth = np.full((count, len(self.watched.names)), -np.inf)
+        depth, work = np.full((count, len(self.watched.names)), -np.inf), self.no_work()
         chunk = max(1, CHUNK // (count * (width + model.nsensordata)))
         for begin in range(0, steps, chunk):
             end = min(begin + chunk, steps)
@@ -175,7 +181,14 @@ class Pool:
             if depth.shape[1]:
                 touching = np.where(good[..., None], self.watched.depths(sensors, np), -np.inf)
                 depth[ids] = np.maximum(depth[ids], touching.max(axis=1))
-        return np.arange(1, steps // every + 1) * (every * model.opt.timestep), out, depth
+            if work.shape[1]:
+                power = np.where(good[..., None], self.watched.power(sensors, np), np.nan)
+                work[ids] += power.sum(axis=1) * model.opt.timestep
+        return np.arange(1, steps // every + 1) * (every * model.opt.timestep), out, depth, work
+
+    def no_work(self) -> Float64[np.ndarray, "B nw"]:
+        """None yet."""
+        return np.zeros((len(self.qpos), len(self.watched.forces)))
 
     def chunk(
         self, ids: Integer[np.ndarray, "n"], controls: Float64[np.ndarray, "n S nu"]
@@ -218,7 +231,7 @@ class Pool:
         broken = np.flatnonzero(~(np.abs(states) < LIMIT).all(axis=1))
         return int(min([max(went - 1, 0), *broken[:1]]))
 
-    def state(self, depth: Float64[np.ndarray, "B W"]) -> State:
+    def state(self, depth: Float64[np.ndarray, "B W"], work: Float64[np.ndarray, "B nw"]) -> State:
         """A copy of the state as it is."""
         valid = self.valid
         blank = np.where(valid, 0.0, np.nan)[:, None]
@@ -231,4 +244,5 @@ class Pool:
             warnings=self.warnings,
             touched=depth >= 0,
             depth=np.maximum(depth, 0.0),
+            work=work + blank,
         )

@@ -14,5 +14,7 @@ class Common(Model):
     """Whether the model must have a free joint."""
     watch: dict[str, tuple[tuple[str, str], ...]] = pydantic.Field(default_factory=dict)
     """{name: pairs of geom names}: contacts that `touched` and `depth` report, a column a name."""
+    work: bool = False
+    """Whether the mechanical work of each actuator is summed up, step by step."""
     fields: tuple[str, ...] = ()
     """Model fields that will differ by simulation, where that is known beforehand: `mjx` then compiles only once."""

@@ -76,6 +76,13 @@ class HostPlanner(Planner):
             object.__setattr__(made, name, value)
         return made
 
+    def __reduce__(self):
+        """With the functions themselves: their numbers are those of one process."""
+        if self.function is not None:
+            return type(self), (self.function, self.limit)
+        known, places = np.unique(np.asarray(self.number), return_inverse=True)
+        return numbered, ([FUNCTIONS[k] for k in known], places.reshape(np.shape(self.number)))
+
     def plan_batch(self, problem: Problem) -> Route:
         """See `Planner`."""
         count, length = problem.start_ij.shape[0], max(problem.length, 3 * sum(problem.shape))
@@ -102,6 +109,12 @@ class HostPlanner(Planner):
 def reals_like(count: int) -> jax.Array:
     """What numbers of a batch are broadcast to."""
     return jnp.zeros(count, jnp.float32)
+
+
+def numbered(functions: list[tuple[MapPlanner, float]], places: np.ndarray) -> HostPlanner:
+    """A batch of planners: which of some functions, with their limits, each of them is."""
+    numbers = np.array([number_of(*function) for function in functions], np.int32)
+    return HostPlanner.tree_unflatten(None, (numbers[places],))
 
 
 KNOWN: dict[tuple[MapPlanner, float], int] = {}
@@ -177,7 +190,8 @@ def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> 
     cells = np.asarray(way)
     if cells.ndim != 2 or cells.shape[1] != 2 or len(cells) == 0 or cells.dtype.kind not in "iuf":
         raise ValueError(f"must return cells [L, 2] or None, not {cells.dtype} {list(cells.shape)}")
-    whole = cells.astype(np.int64)
+    with np.errstate(invalid="ignore"):  # NaN, which is not whole
+        whole = cells.astype(np.int64)
     if not np.array_equal(whole, cells):
         raise ValueError("must return whole rows and columns")
     if tuple(whole[0]) != tuple(start) or tuple(whole[-1]) != tuple(goal):

@@ -21,6 +21,7 @@ MEANING = {
     "clearance": "the least distance from boxes",
     "replans": "plans but the first",
     "measuring": "the share of time spent so",
+    "energy": "work of the servos",
 }
 
 

@@ -33,7 +33,6 @@ from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
 from jaxbiped.mission.queue import Tally
-from jaxbiped.planning.host_planner import HostPlanner
 from jaxbiped.study import evaluate, worker
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress
@@ -97,7 +96,7 @@ class Cluster:
         groups = groups_of(config, points)
         left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
         total = sum(groups[shard.group].rows(shard) for shard in left)
-        refuse_own(config, groups)
+        refuse_own(config)
         board, topic = Board(on_progress, total), f"jaxbiped-{uuid.uuid4()}"
         todo = iter(left)
         running: dict[Future, Shard] = {}
@@ -207,12 +206,8 @@ class Board:
             self.on_progress(Progress(whole.ended, whole.reached, self.total))
 
 
-def refuse_own(config: StudyConfig, groups: Sequence[Group]) -> None:
+def refuse_own(config: StudyConfig) -> None:
     """Raise `InputError` about what only this process has, and no worker could find."""
-    for group in groups:
-        if isinstance(group.settings.planner, HostPlanner):
-            message = "is a function of NumPy arrays, which runs in this process alone: no --scheduler, no --workers"
-            raise InputError(message, field="strategies", value=group.strategies[0])
     for name in config.families:
         if name not in KNOWN and not name.endswith(".toml") and not PLACE.fullmatch(name):
             message = "is registered in this process alone; name it package.module:name for workers to find"

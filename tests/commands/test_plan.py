@@ -196,6 +196,18 @@ def test_start_and_goal_must_be_free_cells_of_the_map(tmp_path, file, start, goa
     assert refused(tmp_path, file, start, goal) == f"{file}: {text}"
 
 
+def test_a_robots_file_gives_the_radius(tmp_path, capsys):
+    (tmp_path / "robot.toml").write_text("radius = 0.05\nbody_radius = 0.05\n")
+    assert run(tmp_path, ROS, (-0.425, 0.675), (0.625, -0.275), robot=tmp_path / "robot.toml") == 1
+    assert run(tmp_path, ROS, (-0.425, 0.675), (0.625, -0.275)) == 0
+    both = {"robot": tmp_path / "robot.toml", "radius": 0.05, "out": tmp_path / "other"}
+    assert "radius: goes without a --robot" in refused(tmp_path, ROS, (-0.425, 0.675), (0.625, -0.275), **both)
+    (tmp_path / "robot.toml").write_text("radius = -1\n")
+    text = refused(tmp_path, ROS, (0, 0), (0.1, 0), robot=tmp_path / "robot.toml", out=tmp_path / "third")
+    assert "robot.toml: radius: must be greater than 0 (got -1)" in text
+    assert "does not go with --scenario" in refused(tmp_path, ROS, scenario=SCEN, robot=tmp_path / "robot.toml")
+
+
 def test_near_an_obstacle_with_a_radius(tmp_path):
     text = refused(tmp_path, ROS, (-0.83, 0.68), (0.75, 0.68), radius=0.05)
     assert "start: must not be inside an obstacle or nearer than the radius of 0.05 m to one" in text

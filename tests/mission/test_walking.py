@@ -11,6 +11,7 @@ from jaxbiped.arenas.scene import BoxConfig, SceneConfig, load_scene, to_arena
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.judging import carried_out
+from jaxbiped.mission.metrics import Energy
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, stack
 from jaxbiped.mission.settings import MissionConfig, program
@@ -22,7 +23,7 @@ from jaxbiped.sensing.camera import CameraConfig
 SIZE = (0.9, 0.6)
 CONFIG = MissionConfig(executor="native", camera=CameraConfig(columns=32, rows=24), walk={"threads": 1})
 PROGRAM = program(CONFIG, SIZE)
-SETTINGS = CONFIG.settings("full")
+SETTINGS = replace(CONFIG.settings("full"), metrics=(Energy(),))
 MARKS = ({"kind": "circle", "at": (0.85, 0.1)}, {"kind": "circle", "at": (0.85, 0.5)})
 
 
@@ -57,6 +58,11 @@ def test_they_reach_their_goals(together):
     assert np.all(together.goal_distance <= 0.1)
     assert np.all(together.distance > 0.05)
     assert np.all(together.time >= 10.0 * together.measurements)
+
+
+def test_their_servos_work(together):
+    (work,) = together.metrics
+    assert np.all(work > 1.0) and work[2] == max(work)  # [J]; the last one has the longest way, over a bump
 
 
 @pytest.mark.parametrize("k", [0, 1, 2])

@@ -27,7 +27,7 @@ def spoiled(array, index, value):
         (3, {}, "must be MJCF"),
         (PENDULUM, {"free_joint": True}, "joint: the model must have a free joint"),
         (HOPPER, {"watch": {"head": [("head", "lintel")]}}, "watch.head: must be pairs of .*beam.*got 'lintel'"),
-        (mujoco.MjModel.from_xml_string(PENDULUM), {"watch": WATCH}, "watch: contacts are watched in MJCF"),
+        (mujoco.MjModel.from_xml_string(PENDULUM), {"watch": WATCH}, "watch: sensors are added to MJCF"),
         (PENDULUM, {"fields": ("geom_poss",)}, "geom_poss: must be the name of a field"),
         (PENDULUM, {"fields": ("geom_type",)}, "geom_type: is the same in all"),
         (PENDULUM, {"fields": ("opt.timestep",)}, "opt.timestep: is the same in all"),

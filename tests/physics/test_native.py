@@ -125,3 +125,37 @@ def test_models_without_free_joint_sensors_or_watches():
 def test_device():
     with pytest.raises(InputError, match="native runs on a CPU"):
         physics.make("native", PENDULUM, 2, device="gpu")
+
+
+UNNAMED = PENDULUM.replace('name="hinge" joint="hinge" gear="1"', 'joint="hinge" gear="2"')
+
+
+@pytest.mark.parametrize("model", [HOPPER, UNNAMED])
+def test_work_is_summed_up_step_by_step(model):
+    batch = physics.make("native", model, 3, work=True)
+    plain = mujoco.MjModel.from_xml_string(model)
+    controls = np.random.default_rng(0).uniform(-0.1, 0.1, (3, 60, 1))
+    first = batch.reset()
+    assert first.work.shape == (3, 1) and not first.work.any()
+    states = [batch.advance(controls[:, k : k + 20], mask=np.array([True, k < 40, True])) for k in (0, 20, 40)]
+    for i in range(3):
+        data, want = mujoco.MjData(plain), []
+        for control in controls[i] if i != 1 else controls[i, :40]:
+            data.ctrl[:] = control
+            mujoco.mj_step(plain, data)
+            want.append(max(0.0, data.actuator_force[0] * data.actuator_velocity[0]) * plain.opt.timestep)
+        want = [sum(want[k : k + 20]) for k in (0, 20, 40)]
+        np.testing.assert_allclose([state.work[i, 0] for state in states], want, rtol=1e-12)
+        assert sum(want) > 0
+    rolled = batch.rollout(controls, record_every=20)
+    np.testing.assert_allclose(rolled.work[0], states[0].work[0] + states[1].work[0] + states[2].work[0], rtol=1e-12)
+    assert rolled.sensordata.shape[-1] == plain.nsensordata  # the model's own sensors alone
+
+
+def test_work_is_not_told_where_it_is_not_asked_for_or_not_known():
+    assert physics.make("native", PENDULUM, 2).reset().work.shape == (2, 0)
+    batch = physics.make("native", PENDULUM, 2, work=True)
+    state = batch.advance(np.array([[[1e12]] * 300, [[0.1]] * 300]))
+    assert np.isnan(state.work[0]).all() and state.work[1] > 0 and state.valid.tolist() == [False, True]
+    with pytest.raises(InputError, match="work: sensors are added to MJCF"):
+        physics.make("native", mujoco.MjModel.from_xml_string(PENDULUM), 1, work=True)

@@ -1,5 +1,11 @@
 """Ways that functions of people return: read and priced as Eq. 1 says, or refused with what is wrong with them."""
 
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import jax
 import numpy as np
 import pytest
 
@@ -8,6 +14,8 @@ from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import DIRECTIONS, Costs, Rules
 from jaxbiped.planning.host_planner import HostPlanner, dared, read_way
 from tests.reference import planning as reference
+
+ROOT = Path(__file__).parents[2]
 
 COSTS = Costs()
 FLAT = np.zeros((3, 4), np.int8)
@@ -94,3 +102,28 @@ def test_what_is_not_dared_is_an_obstacle():
 def test_what_is_no_function_and_no_limit_is_refused(function, limit):
     with pytest.raises(InputError, match="HostPlanner"):
         HostPlanner(function, limit)
+
+
+def first(classes, levels, start_ij, goal_ij, costs):
+    return None
+
+
+def second(classes, levels, start_ij, goal_ij, costs):
+    return None
+
+
+def test_planners_are_sent_to_other_processes_with_their_functions(tmp_path):
+    """Their numbers are those of one process: the other one may have numbered others before."""
+    planners = HostPlanner(second, 3.0), HostPlanner(first), HostPlanner(second, 3.0)
+    batch = jax.tree.map(lambda *leaves: np.stack(leaves), *planners)
+    (tmp_path / "sent").write_bytes(pickle.dumps((HostPlanner(first, 2.0), batch)))
+    code = (
+        "import pickle, sys; from jaxbiped.planning import host_planner as there;"
+        "there.HostPlanner(len); one, many = pickle.load(open(sys.argv[1], 'rb'));"
+        "known = [there.FUNCTIONS[k] for k in many.number];"
+        "print(one.function.__name__, one.limit, [(f.__name__, limit) for f, limit in known])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, tmp_path / "sent"], capture_output=True, text=True, cwd=ROOT, check=True
+    )
+    assert done.stdout == "first 2.0 [('second', 3.0), ('first', 10.0), ('second', 3.0)]\n"

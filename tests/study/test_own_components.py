@@ -17,7 +17,6 @@ from jaxbiped.core.registry import FAMILIES, STRATEGIES, Registry
 from jaxbiped.errors import InputError
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.planning import Costs
-from jaxbiped.planning.host_planner import HostPlanner
 from jaxbiped.planning.planners import GridPlanner, Route, StraightLine, check_route
 from jaxbiped.study.again import play_again
 from jaxbiped.study.comparison import compare
@@ -102,15 +101,10 @@ def test_workers_are_not_given_what_they_cannot_find():
     pytest.importorskip("distributed")
     from jaxbiped.study.cluster import refuse_own
 
-    def groups(*planners):
-        return group_points(only_point(StudyConfig()), [Strategy(f"mine {k}", p) for k, p in enumerate(planners)])
-
-    refuse_own(StudyConfig(), groups(GridPlanner()))
-    with pytest.raises(InputError, match="runs in this process alone"):
-        refuse_own(StudyConfig(), groups(GridPlanner(), HostPlanner(len)))
+    refuse_own(StudyConfig())
     FAMILIES.add("hills", Family("hills", jnp.sin), replace=True)
     with pytest.raises(InputError, match="is registered in this process alone"):
-        refuse_own(StudyConfig(families=("bump", "hills")), [])
+        refuse_own(StudyConfig(families=("bump", "hills")))
 
 
 def test_rows_of_strangers_are_kept_without_an_import(tmp_path, monkeypatch):

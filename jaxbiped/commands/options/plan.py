@@ -44,6 +44,8 @@ class PlanArgs(Options):
     """Allow oblique moves past one blocked cell."""
     radius: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """[m] Grow obstacles by this much, for a disc of a robot on a map of plain occupancy."""
+    robot: Name = None
+    """A robot's TOML file, whose radius is taken for --radius."""
     pitch: Annotated[float, Field(gt=0.0, le=1000.0)] = 0.05
     """[m] Side of a cell of a Moving AI map, whose file does not say."""
     out: Name = None
