@@ -14,7 +14,7 @@ from jaxbiped.core.registry import METRICS as METRICS_OWN
 from jaxbiped.core.registry import STRATEGIES as REGISTERED
 from jaxbiped.core.registry import known_name
 from jaxbiped.mission.config import SIMULATED, MissionConfig
-from jaxbiped.study.names import FAMILIES, KNOWN, METRICS, MOVING, STRATEGIES
+from jaxbiped.study.names import FAMILIES, KNOWN, METRICS, MORE_METRICS, MOVING, STRATEGIES
 
 OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # what the names of components' numbers begin with
 
@@ -40,7 +40,7 @@ StrategyName = Annotated[str, pydantic.AfterValidator(known_strategy)]
 
 def known_metric(name: str) -> str:
     """The same of a metric."""
-    return known_name(name, METRICS, METRICS_OWN, "metric")
+    return known_name(name, (*METRICS, *MORE_METRICS), METRICS_OWN, "metric")
 
 
 MetricName = Annotated[str, pydantic.AfterValidator(known_metric)]
@@ -61,7 +61,8 @@ class StudyConfig(Model):
     """Those that are compared, by default all below."""
     metrics: tuple[MetricName, ...] = METRICS
     """Columns beside those that all rows have: path efficiency (spl), the least distance from boxes (clearance), plans
-    but the first (replans), the share of time spent measuring; or your own, as package.module:name."""
+    but the first (replans), the share of time spent measuring; energy, the work of the servos of simulated bipeds [J];
+    or your own, as package.module:name."""
     numbers: dict[str, float] = pydantic.Field(default_factory=dict)
     """Of your own components, in place of their defaults: planner.clearance, sensor.reach or executor.slip, say."""
     components: Annotated[dict[str, str], tyro.conf.Fixed] = pydantic.Field(default_factory=dict)
