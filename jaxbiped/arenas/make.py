@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 
 from jaxbiped.arenas.arena import Arena, Landmarks
 from jaxbiped.arenas.families import LANDMARKS_KIND, LANDMARKS_X, LANDMARKS_Y, MAX_BOXES, SIZE_X, SIZE_Y
+from jaxbiped.arenas.scene import BoxConfig
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes, plan_distance
 
@@ -32,7 +33,8 @@ def make_arena(
     Args:
       boxes: [M, 7]: centre x and y [m], yaw [rad], length along it and width across it [m], and the heights of its
         bottom and top [m]; a bottom above 0 hangs overhead. A box whose top is not above its bottom, or that has no
-        length or width, is not there: so a generator with more or fewer boxes returns as many each time.
+        length or width, is not there: so a generator with more or fewer boxes returns as many each time. A list may
+        hold `Box` objects, which are not traced, in place of rows.
       start: x, y [m] and yaw [rad].
       goal: x, y [m].
       size: [m] of the area, which begins at the origin; not traced.
@@ -42,6 +44,8 @@ def make_arena(
     Raises:
       InputError: arrays of other shapes, or a size that is not positive.
     """
+    if isinstance(boxes, list | tuple):
+        boxes = [_row(box) if isinstance(box, BoxConfig) else box for box in boxes]
     rows = _array("boxes", boxes if len(boxes) else jnp.zeros((0, 7)), (None, 7), f"[M, 7]: {COLUMNS}")
     start = _array("start", start, (3,), "x, y, yaw")
     goal = _array("goal", goal, (2,), "x, y")
@@ -61,6 +65,11 @@ def make_arena(
         family=jnp.int32(-1),
         difficulty=jnp.asarray(difficulty, jnp.float32),
     )
+
+
+def _row(box: BoxConfig) -> tuple[float, ...]:
+    """Of `COLUMNS`."""
+    return *box.centre, box.yaw, *box.size, box.bottom, box.top
 
 
 def _landmarks(boxes: Boxes, size: Sequence[float]) -> Landmarks:

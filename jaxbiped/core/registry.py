@@ -77,8 +77,13 @@ class Registry(Generic[T]):
                 return self.add(name, convert(load(point.value, self.kind), name))
         if PLACE.fullmatch(name):
             return convert(load(name, self.kind), name.rpartition(":")[2])
-        known = ", ".join(dict.fromkeys([*self.held, *(point.name for point in self.entry_points())]))
+        known = ", ".join(dict.fromkeys(self.offered()))
         raise InputError(f"must be one of {known}, or package.module:name", field=self.kind, value=name)
+
+    def offered(self) -> Iterator[str]:
+        """All names that are registered, or those of entry points."""
+        yield from self.held
+        yield from (point.name for point in self.entry_points())
 
     def entry_points(self) -> Iterator[metadata.EntryPoint]:
         """What other packages offer."""
@@ -96,7 +101,7 @@ def known_name(name: str, built_in: tuple[str, ...], registered: Registry, own: 
       ValueError: what is allowed.
     """
     if not (name in built_in or registered.knows(name) or PLACE.fullmatch(name)):
-        known = ", ".join(dict.fromkeys([*built_in, *registered]))
+        known = ", ".join(dict.fromkeys([*built_in, *registered.offered()]))
         raise ValueError(f"must be one of {known}, {also}or package.module:name of your own {own}")
     return name
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import polars as pl
 import pytest
 
@@ -64,3 +65,11 @@ def test_a_generator_is_a_family_among_others():
 def test_arenas_that_are_none_are_named(arenas, match):
     with pytest.raises(jb.InputError, match=match):
         jb.evaluate(jb.Study(arenas(), ["full"]))
+
+
+def test_boxes_may_be_objects():
+    box = jb.Box(centre=(0.9, 0.7), size=(0.2, 0.4), yaw=0.3, bottom=0.1, top=0.3)
+    one, other = (jb.make_arena(boxes, (0.3, 0.7, 0.0), (1.5, 0.7)) for boxes in (
+        [box, (1, 1, 0, 0, 0, 0, 0)], [(0.9, 0.7, 0.3, 0.2, 0.4, 0.1, 0.3), (1, 1, 0, 0, 0, 0, 0)]))  # fmt: skip
+    for ours, theirs in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
