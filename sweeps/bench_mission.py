@@ -34,6 +34,7 @@ import numpy as np
 
 from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.devices import cores
 from jaxbiped.mission import decision
 from jaxbiped.mission.cycle import conclude, cycle, sense
 from jaxbiped.mission.executors import kinematic
@@ -43,7 +44,7 @@ from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import WORKERS, draw, evaluate, run_all
+from jaxbiped.study.evaluate import draw, evaluate, run_all
 from jaxbiped.study.names import STRATEGIES
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -90,7 +91,7 @@ def pool_of_references():
     """A process a core, of one thread each: more would get in each other's way."""
     for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[name] = "1"
-    return multiprocessing.get_context("spawn").Pool(WORKERS)
+    return multiprocessing.get_context("spawn").Pool(cores())
 
 
 def timed(function, *arguments, **options):
@@ -178,7 +179,7 @@ def compare(arenas: int, repeats: int) -> None:
     _, first = timed(run)
     compiling, fast, slow, fast_cpu, slow_cpu = clock.seconds, [], [], [], []
     with pool_of_references() as pool:
-        pool.starmap(play_one, tasks[: 4 * WORKERS], chunksize=1)  # imports are not counted
+        pool.starmap(play_one, tasks[: 4 * cores()], chunksize=1)  # imports are not counted
         for _ in range(repeats):
             begin = time.process_time()
             result, taken = timed(run)

@@ -87,12 +87,12 @@ def main() -> None:
                 append(frame, shard.number, compile_time=0.0)
             rows = writing.timed(results.finish)(compile_time=0.0).rows
     wall, cpu = time.perf_counter() - begin, time.process_time() - begin_cpu
-    inside = loops.seconds / evaluate.WORKERS + others.seconds
+    inside = loops.seconds / cores() + others.seconds
     print(f"{len(points)} cost vectors x {config.arenas} arenas x 2 strategies: {rows} missions in {wall:.1f} s")
     print(f"  compiled meanwhile: {len(queue.COMPILED) - programs} programs, {clock.seconds - compiling:.1f} s")
-    print(f"  {rows / wall:.0f} missions/s; {cpu / wall:.2f} of {evaluate.WORKERS} cores busy")
+    print(f"  {rows / wall:.0f} missions/s; {cpu / wall:.2f} of {cores()} cores busy")
     print(f"  in compiled code: {100 * inside / wall:.1f} % of the time")
-    print(f"    queues {loops.seconds / evaluate.WORKERS:.1f} s on each core, others {others.seconds:.1f} s")
+    print(f"    queues {loops.seconds / cores():.1f} s on each core, others {others.seconds:.1f} s")
     print(f"  store: {writing.seconds:.2f} s, {100 * writing.seconds / wall:.2f} % of the time")
     print(f"  peak memory: {resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20:.2f} GiB")
 

@@ -11,12 +11,12 @@ from jaxbiped.commands.engine import engine
 from jaxbiped.commands.options.sweep import SweepArgs
 from jaxbiped.commands.progress import progress
 from jaxbiped.config import config_hash
+from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.report.folder_report import terminal_report, write_report
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.conduct import conduct
-from jaxbiped.study.evaluate import WORKERS
 from jaxbiped.study.groups import groups_of, shards, strategies_of
 from jaxbiped.study.memory import check_memory
 from jaxbiped.study.resume import refuse_taken
@@ -44,7 +44,7 @@ def main(args: SweepArgs) -> int:
     groups = groups_of(config, points)
     for group in groups:
         arenas = min(config.shard, config.arenas)
-        queues = max(WORKERS, jax.local_device_count())
+        queues = max(cores(), jax.local_device_count())
         check_memory(group.static, len(group.points), len(group.strategies), arenas, queues)
     for point in points:
         check_mission(point.mission)

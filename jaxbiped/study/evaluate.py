@@ -18,7 +18,8 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.population import Population
 from jaxbiped.arenas.source import OwnFamily, draw_arena, name_of
 from jaxbiped.core.ready_programs import ready_jit
-from jaxbiped.devices import by_rows, mesh_of
+from jaxbiped.core.sizes import ARENAS, JOBS, POINTS, fill, filled
+from jaxbiped.devices import by_rows, cores, mesh_of
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.outcome import Code
@@ -41,7 +42,6 @@ from jaxbiped.study.runner import batch_driver
 from jaxbiped.study.schema import SCHEMA
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
-WORKERS = 2  # queues worked off at once, a core each
 LABELS = np.array([code.label for code in Code if code != Code.RUNNING])  # by code
 
 
@@ -91,19 +91,23 @@ def compute(
     group: Group,
     shard: Shard,
     on_progress: OnProgress = lambda tally: None,
-    workers: int = WORKERS,
+    workers: int | None = None,
 ) -> pl.DataFrame:
-    """The rows of one shard: a function of config, group and shard alone, whatever was computed before, and where."""
-    # The last shard is filled up with arenas beyond the study, so that all shards share one program.
+    """The rows of one shard: a function of config, group and shard alone, whatever was computed before, and where.
+
+    Args:
+      workers: queues worked off at once, a core each; by default as many as this process may use.
+    """
+    # Shards are filled up with arenas beyond the study, so that all of them, and those of others, share programs.
     kind, count = group.kind, group.kind.count(shard.first, shard.count)
-    index = kind.indices(shard.first, min(config.shard, config.arenas))
+    index = kind.indices(shard.first, filled(min(config.shard, config.arenas), ARENAS))
     if count == 0:
         return pl.DataFrame(schema={**SCHEMA, **dict.fromkeys(group.metrics, pl.Float64)})
     size, key = len(index), jax.random.key(config.seed)
     turns = None if len(kind.places) == kind.number else jnp.asarray(kind.turns(index))
     batch, seeds = draw(key, jnp.asarray(index), kind.families, group.populations, turns)
     check_metrics(batch, group, size)
-    with batch_driver(group, workers) as play:
+    with batch_driver(group, workers or cores()) as play:
         result = play(batch, seeds, group.settings, count, group.static, on_progress, population_of=group.population_of)
     batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
     plan = plan_all(batch, group, size)
@@ -149,7 +153,7 @@ def run_all(
     count: int,
     static: Program,
     on_progress: OnProgress,
-    workers: int = WORKERS,
+    workers: int | None = None,
     slots: int = SLOTS,
     population_of: Int[np.ndarray, "P"] | None = None,
     devices: Sequence[jax.Device] | None = None,
@@ -161,6 +165,7 @@ def run_all(
 
     Args:
       batch: [A], or [U * A] where there are `U` populations.
+      workers: by default as many as this process may use cores.
       slots: of each queue. XLA fuses a program by its sizes, and what it fuses otherwise may round otherwise: rows are
         the same, bit for bit, among runs of as many slots, so that few jobs have as many as many do.
       population_of: which of these each point is about; by default the first.
@@ -172,9 +177,9 @@ def run_all(
     real = arena < count
     arena, point = np.concatenate([arena[real], arena[~real]]), np.concatenate([point[real], point[~real]])
     devices = devices or jax.local_devices()
-    queues = len(devices) if len(devices) > 1 else max(1, min(workers, count * kinds))
-    length = max(2, -(-size * kinds // queues))
-    batch, points = at_least_two(batch), at_least_two(points)
+    queues = len(devices) if len(devices) > 1 else max(1, min(workers or cores(), count * kinds))
+    length = filled(-(-size * kinds // queues), JOBS)
+    batch, points = fill_up(batch, ARENAS), fill_up(points, POINTS)
     hands = []
     for number in range(queues):
         mine = np.arange(number, size * kinds, queues)
@@ -199,9 +204,9 @@ def run_all(
     return out
 
 
-def at_least_two(tree):
-    """The tree, with its only row twice where it has but one: XLA makes another program of one arena or one setting."""
-    return jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf]) if leaf.shape[0] == 1 else leaf, tree)
+def fill_up(tree, least: int):
+    """The leaves with as many rows as a program is compiled for, on the host."""
+    return fill(tree, filled(jax.tree.leaves(tree)[0].shape[0], least))
 
 
 def run_threads(
@@ -241,9 +246,9 @@ def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
         mine = np.flatnonzero(group.population_of == population)
         arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
         settings = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.settings)
-        plan = jax.device_get(make(arenas, settings))
+        plan = jax.device_get(make(arenas, fill_up(settings, POINTS)))
         for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(plan), strict=True):
-            rows[mine] = found
+            rows[mine] = found[: len(mine)]
     return out
 
 

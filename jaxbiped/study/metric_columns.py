@@ -10,6 +10,7 @@ import polars as pl
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.core.sizes import POINTS, fill, filled
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.metric import MissionEnd, begun, numbers_at_end
 from jaxbiped.mission.oracle import OraclePlan
@@ -41,7 +42,8 @@ def metric_columns(batch: Arena, group: Group, result: Result, plan: OraclePlan,
         settings, ends, plans = (
             jax.tree.map(lambda leaf, mine=mine: leaf[mine], tree) for tree in (group.settings, full, plan)
         )
-        values = jax.device_get(at_ends(arenas, settings, ends, plans))
+        several = filled(len(mine), POINTS)
+        values = jax.device_get(at_ends(arenas, *(fill(tree, several) for tree in (settings, ends, plans))))
         for row, k in enumerate(mine):
             found[k] = [(value[row, :count], valid[row, :count]) for value, valid in values]
     columns = {}

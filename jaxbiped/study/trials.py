@@ -15,12 +15,13 @@ from jaxtyping import Float, Int
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
+from jaxbiped.devices import cores
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.settings import MissionConfig, Settings, program
 from jaxbiped.planning import Costs
-from jaxbiped.study.evaluate import WORKERS, draw
+from jaxbiped.study.evaluate import draw
 
 VECTORS, BLOCK = 8, 16  # cost vectors and arenas that one queue has room for
 SLOTS = 16  # missions at once: a queue that is not much longer than its slots idles most of them at its end
@@ -88,7 +89,7 @@ class Trials:
         if pieces:
             deal(pieces[0])  # compiles, once
         # All missions are played by other threads: an interrupt here must not leave a running program behind.
-        with ThreadPoolExecutor(WORKERS) as pool:
+        with ThreadPoolExecutor(cores()) as pool:
             try:
                 list(pool.map(play, pieces))
             except BaseException:

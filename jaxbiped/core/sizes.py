@@ -1,0 +1,23 @@
+"""Sizes that programs are compiled for: few of them, so that studies of many sizes share programs."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+
+ARENAS, POINTS, JOBS = 16, 8, 64  # no program is of fewer
+
+
+def filled(count: int, least: int) -> int:
+    """The next power of two from `count` on, at least `least`."""
+    return max(least, 1 << max(count - 1, 0).bit_length())
+
+
+def fill(tree, count: int):
+    """The leaves [n, ...] of a pytree on the host, with their last row again up to `count` rows."""
+
+    def grow(leaf):
+        leaf = np.asarray(leaf)
+        return leaf[np.minimum(np.arange(count), leaf.shape[0] - 1)]
+
+    return jax.tree.map(grow, tree)
