@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: install compare quick test test-all lint bench clean
+.PHONY: install compare quick test test-all lint bench docs clean
 
 # The quickest tests of every room: a minute on two cores.
 QUICK := $(addprefix tests/, test_config.py test_errors.py test_imports.py core \
@@ -52,6 +52,14 @@ bench: install
 	$(BIN)/python sweeps/bench_planning.py
 	$(BIN)/python sweeps/bench_mapping.py
 	$(BIN)/python sweeps/bench_mission.py
+
+# The guide, built into build/site; broken links and names that are not there are errors.
+$(VENV)/docs-installed: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	touch $@
+
+docs: $(VENV)/docs-installed
+	$(BIN)/mkdocs build --strict --quiet
 
 clean:
 	rm -rf $(VENV) results build *.egg-info
