@@ -59,7 +59,7 @@ $(VENV)/docs-installed: $(VENV)/installed
 	touch $@
 
 docs: $(VENV)/docs-installed
-	$(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 clean:
 	rm -rf $(VENV) results build *.egg-info

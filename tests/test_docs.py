@@ -111,7 +111,7 @@ def test_readme_is_short():
 @pages
 def test_lines_of_prose_are_no_longer_than_others(page):
     lines = [line for line in prose(page).splitlines() if not line.startswith(("|", "!["))]
-    assert not [line for line in lines if len(line) > 130]
+    assert not [line for line in lines if len(line) > 120]
 
 
 @pages
