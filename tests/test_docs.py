@@ -19,7 +19,7 @@ from jaxbiped.core import registry
 ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "docs"
 PAGES = [ROOT / "README.md", *sorted(GUIDE.rglob("*.md"))]
-FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FENCE = re.compile(r"^```\{?\.?(\w*)\}?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 SNIPPET = re.compile(r'^--8<-- "(.+)"$', re.MULTILINE)
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
 PLACE = re.compile(r"(?<![\w/.-])(?:sweeps|configs|tests|docs|jaxbiped)/[\w./*-]*\w")
