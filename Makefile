@@ -4,10 +4,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: install compare quick test test-all lint bench clean
+.PHONY: install compare quick test test-all lint bench docs clean
 
 # The quickest tests of every room: a minute on two cores.
-QUICK := $(addprefix tests/, test_config.py test_errors.py test_imports.py core \
+QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_imports.py core \
   $(addprefix arenas/, test_scene.py) \
   $(addprefix mapping/, test_class_grid.py test_grid.py test_leveling.py test_moving_ai.py test_ros_map.py) \
   $(addprefix planning/, test_path.py) \
@@ -52,6 +52,14 @@ bench: install
 	$(BIN)/python sweeps/bench_planning.py
 	$(BIN)/python sweeps/bench_mapping.py
 	$(BIN)/python sweeps/bench_mission.py
+
+# The guide, built into build/site; broken links and names that are not there are errors.
+$(VENV)/docs-installed: $(VENV)/installed
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	touch $@
+
+docs: $(VENV)/docs-installed
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 clean:
 	rm -rf $(VENV) results build *.egg-info
