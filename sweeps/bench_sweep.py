@@ -20,6 +20,7 @@ from pathlib import Path
 
 import jax
 
+from jaxbiped.devices import cores
 from jaxbiped.mission import queue
 from jaxbiped.study import evaluate, store
 from jaxbiped.study.clock import CompileClock

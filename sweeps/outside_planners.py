@@ -1,4 +1,4 @@
-"""Planners of other libraries, and of the examples, in the closed loop against `full`: README's second table.
+"""Planners of other libraries, and of the examples, in the closed loop against `full`: README's table of planners.
 
     pip install 'jaxbiped[planners]'
     python sweeps/outside_planners.py [--arenas 600] [--seed 0] [--out FOLDER]
