@@ -44,8 +44,9 @@ from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import draw, evaluate, run_all
+from jaxbiped.study.evaluate import draw, evaluate
 from jaxbiped.study.names import STRATEGIES
+from jaxbiped.study.queues import run_all
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.reference import mission as reference

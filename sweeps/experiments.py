@@ -26,8 +26,8 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.evaluate import run_all
 from jaxbiped.study.hosted import open_eyes, run_on_host
+from jaxbiped.study.queues import run_all
 from jaxbiped.study.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.study.walks import walk_all
 

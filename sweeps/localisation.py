@@ -32,9 +32,10 @@ from jaxbiped.mission.queue import Result, stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.evaluate import draw, run_all
+from jaxbiped.study.evaluate import draw
 from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.paired import success_difference
+from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
 
 SCENES = sorted((Path(__file__).parent.parent / "configs" / "scenes").glob("experiment_*.toml"))

@@ -21,3 +21,8 @@ def fill(tree, count: int):
         return leaf[np.minimum(np.arange(count), leaf.shape[0] - 1)]
 
     return jax.tree.map(grow, tree)
+
+
+def fill_up(tree, least: int):
+    """The leaves with as many rows as a program is compiled for, on the host."""
+    return fill(tree, filled(jax.tree.leaves(tree)[0].shape[0], least))

@@ -35,7 +35,7 @@ def run_on_host(
     population_of: Int[np.ndarray, "P"],
     workers: int = 2,
 ) -> Result:
-    """As `evaluate.run_all`, for a sensor that measures on the host: each worker is a thread with eyes of its own.
+    """As `queues.run_all`, for a sensor that measures on the host: each worker is a thread with eyes of its own.
 
     OpenGL and OpenCV work while the other thread has the interpreter. Which of them plays a mission does not change its
     result.

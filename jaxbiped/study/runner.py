@@ -90,9 +90,9 @@ def numbered(settings: Settings, strategy: str | Strategy, numbers: Mapping[str,
 
 @contextlib.contextmanager
 def batch_driver(group: Group, workers: int) -> Iterator[Callable[..., Result]]:
-    """What plays the missions of a group: a function with the arguments of `evaluate.run_all`."""
-    from jaxbiped.study.evaluate import run_all  # which asks for this
+    """What plays the missions of a group: a function with the arguments of `queues.run_all`."""
     from jaxbiped.study.hosted import open_eyes, run_on_host
+    from jaxbiped.study.queues import run_all
 
     with contextlib.ExitStack() as stack:
         see = partial(open_eyes, group.camera, group.static.localisation) if group.camera else None

@@ -8,7 +8,7 @@ import pytest
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.stepped import run_logged
-from jaxbiped.study.evaluate import run_all
+from jaxbiped.study.queues import run_all
 from tests.mission.conftest import PROGRAM, pad, play, row
 
 # A program for another number of slots may sum in another order: a hundred roundings of a float32.

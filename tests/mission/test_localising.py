@@ -19,7 +19,7 @@ from jaxbiped.mission.state import start
 from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing import Motion, Sightings, View, predict
 from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.evaluate import run_all
+from jaxbiped.study.queues import run_all
 
 AREA = (1.8, 1.4)
 MOVED, VARIANCES = jnp.array([0.05, 0.0, 0.0]), jnp.array([1e-6, 1e-6, 1e-4])

@@ -1,0 +1,103 @@
+"""Missions dealt to compiled queues: one for each core, or for each device."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Int, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.sizes import ARENAS, JOBS, POINTS, fill_up, filled
+from jaxbiped.devices import cores, mesh_of
+from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
+from jaxbiped.mission.settings import Program, Settings
+
+
+@with_own_settings
+def run_all(
+    batch: Arena,
+    seeds: UInt32[Array, "A"],
+    points: Settings,
+    count: int,
+    static: Program,
+    on_progress: OnProgress,
+    workers: int | None = None,
+    slots: int = SLOTS,
+    population_of: Int[np.ndarray, "P"] | None = None,
+    devices: Sequence[jax.Device] | None = None,
+) -> Result:
+    """The first `count` arenas under every point: results [P, count], on the host.
+
+    Jobs are dealt to as many queues as there are devices, or to as many as there are workers where there is one device.
+    Which queue a job is in does not change its result.
+
+    Args:
+      batch: [A], or [U * A] where there are `U` populations.
+      workers: by default as many as this process may use cores.
+      slots: of each queue. XLA fuses a program by its sizes, and what it fuses otherwise may round otherwise: rows are
+        the same, bit for bit, among runs of as many slots, so that few jobs have as many as many do.
+      population_of: which of these each point is about; by default the first.
+      devices: by default all of this process.
+    """
+    size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
+    block = size * (np.zeros(kinds, int) if population_of is None else population_of)
+    arena, point = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(kinds)))
+    real = arena < count
+    arena, point = np.concatenate([arena[real], arena[~real]]), np.concatenate([point[real], point[~real]])
+    devices = devices or jax.local_devices()
+    queues = len(devices) if len(devices) > 1 else max(1, min(workers or cores(), count * kinds))
+    length = filled(-(-size * kinds // queues), JOBS)
+    batch, points = fill_up(batch, ARENAS), fill_up(points, POINTS)
+    hands = []
+    for number in range(queues):
+        mine = np.arange(number, size * kinds, queues)
+        mine = np.concatenate([mine, np.zeros(length - len(mine), int)])
+        active = len(range(number, count * kinds, queues))
+        place = jnp.asarray(arena[mine] + block[point[mine]])
+        jobs = Jobs(place, jnp.asarray(point[mine]), seeds[arena[mine]], jnp.int32(active))
+        hands.append(jobs)
+    if len(devices) > 1:
+        jobs, mesh = stack(hands), mesh_of(devices)
+        result = jax.device_get(
+            compile_queue(batch, points, jobs, static, slots, mesh)(batch, points, jobs, on_progress)
+        )
+        results = [jax.tree.map(lambda leaf, number=number: leaf[number], result) for number in range(queues)]
+    else:
+        results = run_threads(compile_queue(batch, points, hands[0], static, slots), batch, points, hands, on_progress)
+    out = jax.tree.map(lambda leaf: np.zeros((kinds, count), leaf.dtype), results[0])
+    for number, result in enumerate(results):
+        mine = np.arange(number, count * kinds, queues)
+        for all_rows, rows in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):
+            all_rows[point[mine], arena[mine]] = rows[: len(mine)]
+    return out
+
+
+def run_threads(
+    work: Work, batch: Arena, points: Settings, hands: Sequence[Jobs], on_progress: OnProgress
+) -> list[Result]:
+    """Work off queues at once, a thread each."""
+    tallies, lock = [Tally(0, 0)] * len(hands), threading.Lock()
+    stop = threading.Event()
+
+    def play(number: int) -> Result:
+        def tell(tally: Tally) -> None:
+            if stop.is_set():
+                raise InterruptedError
+            with lock:
+                tallies[number] = tally
+                on_progress(sum(tallies, Tally(0, 0)))
+
+        return jax.device_get(work(batch, points, hands[number], tell))
+
+    with ThreadPoolExecutor(len(hands)) as pool:
+        try:
+            return list(pool.map(play, range(len(hands))))
+        except BaseException:
+            stop.set()  # an interrupt shall not wait for the whole shard
+            raise
