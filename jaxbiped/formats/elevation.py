@@ -18,42 +18,25 @@ Heights below 0 are allowed, and so are holes; what is not finite is one.
 from __future__ import annotations
 
 import io
-import re
 import warnings
 import zipfile
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Float64, Shaped
-from PIL import Image, UnidentifiedImageError
+from jaxtyping import Float64
 
 from jaxbiped.errors import InputError
-from jaxbiped.files import read_text, reason, write_whole
+from jaxbiped.files import reason, write_whole
+from jaxbiped.formats.esri_grid import read_asc
+from jaxbiped.formats.height_pictures import read_picture
+from jaxbiped.formats.heights import GREATEST, check_heights, check_shape
 from jaxbiped.geometry.height_field import HeightField
-from jaxbiped.mapping.grid import MOST_CELLS
-from jaxbiped.sensing.image_depth import (
-    COLOURS,
-    HEIGHT,
-    PNG,
-    RGB,
-    TIFF,
-    WHITE_IS_0,
-    WIDTH,
-    no_chatter,
-    sample_bits,
-    tiff_tags,
-)
 
 SUFFIXES = (".npz", ".png", ".tif", ".tiff", ".asc")
 KEYS = ("heights", "pitch", "origin_xy")
-GREATEST = 1e4  # [m] of a height; what is more is a mark for "no data" that the file does not declare
-NO_DATA = -9999.0  # of an ASCII grid that names none
-CORNERS = (("xllcorner", "xllcenter"), ("yllcorner", "yllcenter"))
-ORIENTATION = 0x0112  # the EXIF tag
 
 
 @dataclass(frozen=True)
@@ -144,27 +127,6 @@ def check_options(cell: float | None, range: tuple[float, float] | None, scale: 
         raise InputError(message, field=f"{prefix}range", value=range)
 
 
-def check_heights(heights: Float64[np.ndarray, "P Q"], path: Path) -> None:
-    """Raise `InputError` unless the heights of a file make a surface."""
-    known = heights[np.isfinite(heights)]
-    if not known.size:
-        message = "must hold heights; all are holes (NaN, no data or transparent)"
-        raise InputError(message, file=path, value=f"{heights.size} holes")
-    if np.abs(known).max() > GREATEST:
-        message = f"must hold heights within {GREATEST:,.0f} m of 0; a mark for what was not measured must be declared"
-        raise InputError(message, file=path, value=float(known[np.abs(known).argmax()]))
-    if known.min() == known.max():
-        raise InputError(f"must hold heights that differ; all are {known[0]:g} m", file=path)
-
-
-def check_shape(rows: int, columns: int, path: Path) -> None:
-    """Raise `InputError` about a file with too few or too many heights, before they are unpacked."""
-    if min(rows, columns) < 2:
-        raise InputError("must have at least 2 x 2 heights", file=path, value=f"{rows} x {columns}")
-    if rows * columns > MOST_CELLS:
-        raise InputError(f"must have at most {MOST_CELLS:,} heights", file=path, value=f"{rows} x {columns}")
-
-
 def read_npz(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray, "2"], float]:
     """Heights, place of the first, and pitch."""
     damaged = InputError("is no .npz, or was cut short", file=path)
@@ -216,155 +178,3 @@ def header_shape(member: io.BufferedIOBase) -> tuple[int, ...]:
     version = np.lib.format.read_magic(member)
     reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     return reader(member)[0]
-
-
-def read_asc(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray, "2"], float]:
-    """Heights, place of the first, and pitch."""
-    words = read_text(path, otherwise="latin-1").split()
-    header: dict[str, float] = {}
-    while len(words) > 2 * len(header) and re.match(r"[A-Za-z_]", key := words[2 * len(header)]):
-        if key.lower() in ("nan", "inf", "infinity"):
-            break
-        value = words[2 * len(header) + 1 : 2 * len(header) + 2]
-        if key.lower() in header:
-            raise InputError("must be given once", file=path, field=key.lower())
-        header[key.lower()] = number(value[0] if value else "", path, key.lower())
-    body = words[2 * len(header) :]
-    if "cellsize" not in header and "dx" in header:
-        if header["dx"] != header.get("dy"):
-            message = "must be equal: cells are square"
-            raise InputError(message, file=path, field="dx, dy", value=(header["dx"], header.get("dy")))
-        header["cellsize"] = header["dx"]
-    for key in ("ncols", "nrows", "cellsize"):
-        if key not in header:
-            raise InputError("is missing from the header of an ASCII grid", file=path, field=key)
-        whole = key != "cellsize"
-        if not 0 < header[key] < np.inf or (whole and header[key] % 1):
-            raise InputError(f"must be a {'whole ' * whole}number above 0", file=path, field=key, value=header[key])
-    rows, columns, pitch = int(header["nrows"]), int(header["ncols"]), header["cellsize"]
-    check_shape(rows, columns, path)
-    origin = []
-    for corner, centre in CORNERS:
-        value = header[corner] + pitch / 2 if corner in header else header.get(centre, pitch / 2)
-        if not np.isfinite(value):
-            raise InputError("must be finite", file=path, field=corner if corner in header else centre, value=value)
-        origin.append(value)
-    if len(body) != rows * columns:
-        message = f"must hold nrows x ncols = {rows * columns} heights after its header"
-        raise InputError(message, file=path, value=len(body))
-    try:
-        heights = np.array(body, np.float64)
-    except ValueError:
-        bad = next(word for word in body if not is_number(word))
-        raise InputError("must hold numbers after its header", file=path, value=bad) from None
-    heights = np.where(heights == header.get("nodata_value", NO_DATA), np.nan, heights)
-    return heights.reshape(rows, columns)[::-1].copy(), np.array(origin), pitch
-
-
-def is_number(word: str) -> bool:
-    """Whether Python reads a word as a number."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
-def number(word: str, path: Path, key: str) -> float:
-    """The value of a header's key."""
-    if not is_number(word):
-        raise InputError("must be a number", file=path, field=key, value=word)
-    return float(word)
-
-
-def read_picture(
-    path: Path, range: tuple[float, float] | None, hole: float | None, prefix: str
-) -> Float64[np.ndarray, "P Q"]:
-    """Heights [m] of a picture, lowest row first."""
-    values, opaque, full = grey_values(path)
-    if full is None:
-        if range is not None:
-            message = "goes with whole numbers; this picture holds floating-point ones, which are heights in metres"
-            raise InputError(message, file=path, field=f"{prefix}range", value=range)
-        heights = values.astype(np.float64)
-    else:
-        if range is None:
-            message = f"is required: heights LOW and HIGH [m] of the values 0 and {full}"
-            raise InputError(message, file=path, field=f"{prefix}range")
-        heights = range[0] + values / full * (range[1] - range[0])
-    known = opaque if hole is None else opaque & (values != hole)
-    return np.where(known, heights, np.nan)[::-1].copy()
-
-
-def grey_values(path: Path) -> tuple[Float[np.ndarray, "P Q"], Shaped[np.ndarray, "P Q"], int | None]:
-    """Values of a picture, top row first; where it is opaque; and the greatest value there can be, None of reals."""
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError("no such file", file=path) from None
-    except OSError as error:
-        raise InputError(f"cannot be read: {reason(error)}", file=path) from None
-    if not data.startswith((PNG, *TIFF)):
-        raise InputError("must be a PNG or TIFF picture", file=path)
-    try:
-        with no_chatter():
-            samples = read_deep(data, path) if sample_bits(data) > 8 else read_shallow(data, path)
-    except InputError:
-        raise
-    except UnidentifiedImageError:
-        raise InputError("is damaged, or a kind of picture that is not supported", file=path) from None
-    except Exception:  # Pillow and OpenCV raise whatever a damaged picture makes them trip over
-        raise InputError("is damaged or cut short", file=path) from None
-    full = int(np.iinfo(samples.dtype).max) if samples.dtype.kind == "u" else None
-    if samples.dtype.kind not in "uf" or (full or 0) > 65535:
-        raise InputError("must be of 8 or 16 bits, or of floating-point numbers", file=path, value=str(samples.dtype))
-    samples = samples if samples.ndim == 3 else samples[..., None]
-    opaque = np.ones(samples.shape[:2], bool)
-    if samples.shape[2] in (2, 4):
-        opaque = samples[..., -1] == (1.0 if full is None else full)
-        samples = samples[..., :-1]
-    first = samples[..., :1]
-    unequal = ((samples != first) & ((samples == samples) | (first == first))).any(2) & opaque  # NaN equals NaN
-    if unequal.any():
-        i, j = np.argwhere(unequal)[0]
-        message = "must be grey: its channels differ, and a colour is no height"
-        raise InputError(message, file=path, field=f"pixel ({j}, {i})", value=tuple(samples[i, j].tolist()))
-    return samples[..., 0].astype(np.float64), opaque, full
-
-
-def read_shallow(data: bytes, path: Path) -> Shaped[np.ndarray, "P Q 4"]:
-    """RGBA of a picture of at most 8 bits."""
-    with Image.open(io.BytesIO(data), formats=("PNG", "TIFF")) as picture:
-        check_shape(picture.height, picture.width, path)
-        picture.load()
-        turned = picture.getexif().get(ORIENTATION, 1)
-        if turned != 1:
-            raise InputError("must be upright as it is stored, not turned by its EXIF tag", file=path, value=turned)
-        return np.asarray(picture.convert("RGBA"))
-
-
-def read_deep(data: bytes, path: Path) -> Shaped[np.ndarray, "P Q *C"]:
-    """Samples of a picture of more than 8 bits, whose bits OpenCV keeps: grey, or colour and perhaps alpha."""
-    colours = None
-    if data.startswith(PNG):
-        with Image.open(io.BytesIO(data), formats=("PNG",)) as picture:  # which knows a file that is cut short
-            check_shape(picture.height, picture.width, path)
-            picture.load()
-    else:
-        tags = tiff_tags(data)
-        check_shape(int(tags[HEIGHT]), int(tags[WIDTH]), path)
-        colours = tags.get(COLOURS)
-        if colours not in (0, 1, RGB):
-            raise InputError("must be grey, or colour whose channels are equal (RGB)", file=path)
-    before = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
-    try:
-        samples = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    finally:
-        cv2.utils.logging.setLogLevel(before)
-    if samples is None or samples.dtype.itemsize * 8 < sample_bits(data):
-        raise InputError("is damaged, or a kind of picture that is not supported", file=path)
-    if colours == WHITE_IS_0:
-        if samples.dtype.kind != "u":
-            raise InputError("must not be a picture in which 0 is white and samples are reals", file=path)
-        samples = np.iinfo(samples.dtype).max - samples
-    return samples
