@@ -119,10 +119,10 @@ class Energy(Metric):
 
 
 for _name, _metric in (
-    ("energy", Energy()),
     ("spl", PathEfficiency()),
     ("clearance", LeastClearance()),
     ("replans", Replans()),
     ("measuring", MeasuringShare()),
+    ("energy", Energy()),
 ):
     METRICS.add(_name, _metric)
