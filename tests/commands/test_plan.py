@@ -205,7 +205,9 @@ def test_a_robots_file_gives_the_radius(tmp_path, capsys):
     (tmp_path / "robot.toml").write_text("radius = -1\n")
     text = refused(tmp_path, ROS, (0, 0), (0.1, 0), robot=tmp_path / "robot.toml", out=tmp_path / "third")
     assert "robot.toml: radius: must be greater than 0 (got -1)" in text
-    assert "does not go with --scenario" in refused(tmp_path, ROS, scenario=SCEN, robot=tmp_path / "robot.toml")
+    assert "does not go with --scenario" in refused(
+        tmp_path, ROS, scenario=SCEN, robot=tmp_path / "robot.toml", out=tmp_path / "fourth"
+    )
 
 
 def test_near_an_obstacle_with_a_radius(tmp_path):
