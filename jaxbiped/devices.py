@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache, partial
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -16,8 +18,19 @@ EACH, ALL = PartitionSpec(AXIS), PartitionSpec()  # a row or rows of the leading
 
 
 def cores() -> int:
-    """Cores that this process may use: those of its affinity, where the system has one (macOS has none)."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """Cores that this process may use: those of its affinity, where the system has one (macOS has none), and no more
+    than its control group's share of their time, where it has one."""
+    known = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return max(1, min(known, share_of_cores()))
+
+
+def share_of_cores(file: str = "/sys/fs/cgroup/cpu.max") -> int:
+    """Cores, rounded up, whose time the control group may have."""
+    try:
+        quota, period = Path(file).read_text().split()
+        return -(-int(quota) // int(period))
+    except (OSError, ValueError, ZeroDivisionError):  # there is none, or "max"
+        return sys.maxsize
 
 
 def mesh_of(devices: Sequence[jax.Device]) -> Mesh:

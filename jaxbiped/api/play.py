@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import jax
 
 from jaxbiped.api.register import named
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.scene import load_scene
+from jaxbiped.arenas.scene import SceneConfig, load_scene, to_arena, to_terrain
 from jaxbiped.files import new_folder, write_whole
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission, Played
@@ -79,7 +79,7 @@ class PlayedMission:
 
 
 def play(
-    scene: str | Path | Arena,
+    scene: str | Path | Arena | SceneConfig,
     strategy: str | Strategy | Planner = "full",
     mission: MissionConfig | None = None,
     *,
@@ -91,13 +91,16 @@ def play(
     Consumes `jax.random.key(seed)`.
 
     Args:
-      scene: a TOML file, or an arena.
+      scene: a TOML file, a scene, or an arena.
       strategy: a name, or a strategy, planner or function of your own.
 
     Raises:
       InputError: a scene that is wrong, a strategy that is not known, something that cannot be run on this machine.
     """
-    name, arena = ("arena", scene) if isinstance(scene, Arena) else load_scene(scene)
+    if isinstance(scene, SceneConfig):
+        name, arena = scene.name, replace(to_arena(scene), terrain=to_terrain(scene, Path()))
+    else:
+        name, arena = ("arena", scene) if isinstance(scene, Arena) else load_scene(scene)
     config = MissionConfig() if mission is None else mission
     chosen = find_strategy(strategy) if isinstance(strategy, str) else named(strategy)
     check_mission(config)

@@ -95,6 +95,8 @@ class Study:
     def __post_init__(self):
         if isinstance(self.strategies, str | Strategy | Planner):
             raise InputError("must be a list", field="strategies", value=self.strategies)
+        if isinstance(self.metrics, str | Metric | type):
+            raise InputError("must be a list", field="metrics", value=self.metrics)
         object.__setattr__(self, "own", tuple(named(item) for item in self.strategies if not isinstance(item, str)))
         self.config()
 
@@ -111,16 +113,14 @@ class Study:
             "arenas": self.arenas.count,
             "families": tuple(map(family_name, self.arenas.families)),
             "strategies": tuple(item if isinstance(item, str) else named(item).name for item in self.strategies),
-            "metrics": tuple(
-                register(item, replace=True) if isinstance(item, Metric) else item for item in self.metrics
-            ),
+            "metrics": tuple(item if isinstance(item, str) else metric_name(item) for item in self.metrics),
             "numbers": dict(self.numbers),
             "population": self.arenas.population.model_dump(),
             "mission": self._mission(),
             "shard": self.shard,
         }
         if axes is not None:
-            data["axes"] = [{"field": name, "values": tuple(map(float, values))} for name, values in axes.items()]
+            data["axes"] = [{"field": name, "values": numbers_of_axis(name, values)} for name, values in axes.items()]
         try:
             config = (StudyConfig if axes is None else SweepConfig).model_validate(data)
         except pydantic.ValidationError as error:
@@ -155,3 +155,18 @@ class Study:
             shard=config.shard,
             numbers=config.numbers,
         )
+
+
+def metric_name(thing: Any) -> str:
+    """The name of a metric, or of a class of metrics, which is registered; `InputError` for anything else."""
+    if isinstance(thing, Metric) or (isinstance(thing, type) and issubclass(thing, Metric)):
+        return register(thing, replace=True)
+    raise InputError("must be a name, or a Metric or its class", field="metrics", value=thing)
+
+
+def numbers_of_axis(name: str, values: Any) -> tuple[float, ...]:
+    """The values of an axis; `InputError` unless they are a list of numbers."""
+    try:
+        return tuple(map(float, values))
+    except (TypeError, ValueError):
+        raise InputError("must be a list of numbers", field=f"axes.{name}", value=values) from None

@@ -44,8 +44,12 @@ def make_arena(
     Raises:
       InputError: arrays of other shapes, or a size that is not positive.
     """
+    contrast = 1.0
     if isinstance(boxes, list | tuple):
+        contrast = jnp.array([box.contrast if isinstance(box, BoxConfig) else 1.0 for box in boxes], jnp.float32)
         boxes = [_row(box) if isinstance(box, BoxConfig) else box for box in boxes]
+    elif not hasattr(boxes, "__len__"):
+        raise InputError(f"must be a list of boxes or an array [M, 7]: {COLUMNS}", field="boxes", value=type(boxes))
     rows = _array("boxes", boxes if len(boxes) else jnp.zeros((0, 7)), (None, 7), f"[M, 7]: {COLUMNS}")
     start = _array("start", start, (3,), "x, y, yaw")
     goal = _array("goal", goal, (2,), "x, y")
@@ -54,7 +58,8 @@ def make_arena(
     slots = max(MAX_BOXES, rows.shape[0])  # as random arenas have, so that they share compiled programs
     x, y, yaw, length, width, bottom, top = jnp.pad(rows, ((0, slots - rows.shape[0]), (0, 0))).T
     used = (top > bottom) & (length > 0) & (width > 0)
-    placed = Boxes(x, y, yaw, length / 2, width / 2, bottom, top, bottom > 0, jnp.ones(slots), used)
+    seen = jnp.ones(slots).at[: len(rows)].set(contrast)
+    placed = Boxes(x, y, yaw, length / 2, width / 2, bottom, top, bottom > 0, seen, used)
     return Arena(
         size_xy=jnp.array(size, jnp.float32),
         boxes=placed,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+import time
 from collections.abc import Mapping
 from types import ModuleType
 from typing import Any
@@ -29,6 +30,7 @@ def lazy_package(package: str, public: Mapping[str, str], modules: str = "") -> 
     self.__class__ = LazyPackage
 
 
+IMPORTED = time.time()  # [s since the epoch] before any other module of the package was read
 REPLACED: set[str] = set()  # what was replaced in modules of such packages since they were loaded
 
 

@@ -3,9 +3,11 @@
 XLA's own cache (`core.program_cache`) is keyed by the lowered program, and to trace and lower one takes seconds. Here
 the key is what a program is traced from: the text of this package, its function, what is static, the shapes and types
 of its arguments, JAX's settings, the versions of JAX and XLA and the kind of processor. So it is used only where that
-is all: on one device, outside of other traces, where every type of the arguments and everything static is of this
-package or plain, and where nobody has replaced anything in a module of it. Programs that call back into Python are
-traced anew, since what they call is known by numbers of one process. `jax.jit` stands in everywhere else.
+is all: on one device of one process, outside of other traces, where every type of the arguments and everything static
+is of this package or plain, and where nobody has replaced anything in a module or a class of it, or edited its files
+since they were read. Tables that are changed in place are not seen: `JAXBIPED_CACHE=off` then. Programs that call back
+into Python are traced anew, since what they call is known by numbers of one process. `jax.jit` stands in everywhere
+else. A kept program is code that runs: the folder must be the user's own, as it is by default.
 """
 
 from __future__ import annotations
@@ -20,6 +22,8 @@ import io
 import os
 import pickle
 import re
+import sys
+import types
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -34,7 +38,7 @@ from jax.experimental import serialize_executable
 
 from jaxbiped.core import kept_files
 from jaxbiped.core.cache_folder import MOST_PROGRAMS
-from jaxbiped.core.lazy_package import REPLACED
+from jaxbiped.core.lazy_package import IMPORTED, REPLACED
 from jaxbiped.core.program_cache import LAST, program_folder
 
 KIND = b"jaxbiped ready program 1\n"
@@ -44,6 +48,15 @@ PLAIN = bool | int | float | str | bytes | None
 
 Target = tuple[str, tuple]  # a module, and what its `registered` is called with
 TARGETS: dict[str, Target] = {}  # by the names that XLA knows kernels by
+COMPILING = (
+    *("jax_disable_most_optimizations", "jax_optimization_level", "jax_exec_time_optimization_effort"),
+    *("jax_memory_fitting_level", "jax_memory_fitting_effort"),
+)
+XLA_FLAGS = os.environ.get("XLA_FLAGS", "")  # as XLA reads them, once
+TRUSTED = (
+    *("jaxbiped", "pydantic", "dataclasses", "abc", "enum", "typing", "functools", "contextlib", "jaxtyping"),
+    *("collections", "beartype"),
+)  # modules from which functions come into our classes
 CALLED = re.compile(r'custom_call_target="([^"]+)"')
 
 
@@ -71,7 +84,11 @@ def ready_jit(function: Callable | None = None, *, static_argnames: tuple[str, .
         leaves, tree = jax.tree.flatten(arguments)
         if not may_be_ready(leaves):
             return jitted(*args, **kwargs)
-        key = tree, static, tuple(map(jax.typeof, leaves)), trace_settings()
+        try:
+            kinds = tuple(map(jax.typeof, leaves))
+        except TypeError:  # numbers of another byte order, say
+            return jitted(*args, **kwargs)
+        key = tree, static, tuple(type(value) for _, value in static), kinds, trace_settings(), compile_settings()
         program = programs.get(key)
         if program is None:
             program = programs[key] = (
@@ -117,15 +134,27 @@ def ready(
 
 def may_be_ready(leaves: list) -> bool:
     """Whether arguments are arrays on the one device, or numbers."""
-    if jax.config.jax_disable_jit or len(jax.local_devices()) != 1:
+    if jax.config.jax_disable_jit or not has_one_device():
         return False
-    return not any(isinstance(leaf, jax.core.Tracer) for leaf in leaves)
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
+        return False
+    if jax.default_backend() == "cpu":
+        return True  # there is no other device
+    device = {jax.local_devices()[0]}
+    return all(leaf.devices() == device for leaf in leaves if isinstance(leaf, jax.Array))
+
+
+def has_one_device() -> bool:
+    """Whether this process is alone, with one device, which nobody has chosen."""
+    return jax.process_count() == 1 and len(jax.devices()) == 1 and jax.config.jax_default_device is None
 
 
 def program_file(name: str, arguments: tuple, static: Any) -> Path | None:
     """Where a program is kept; None for one that is not."""
     folder = program_folder()
-    if folder is None or REPLACED or len(jax.local_devices()) != 1 or jax.config.jax_compilation_cache_dir:
+    if folder is None or not jax.config.jax_enable_compilation_cache or jax.config.jax_compilation_cache_dir:
+        return None
+    if REPLACED or not has_one_device() or has_foreign_methods():
         return None
     made = hashlib.sha256()
     try:
@@ -139,7 +168,8 @@ def program_file(name: str, arguments: tuple, static: Any) -> Path | None:
 def facts() -> tuple[str, ...]:
     """What holds for all programs of this process."""
     plain = [value for value in trace_settings() if isinstance(value, PLAIN | enum.Enum)]
-    return (*of_this_machine(), repr(plain), os.environ.get("XLA_FLAGS", ""))
+    others = {name: value for name, value in jax.config.values.items() if "cache" not in name}
+    return (*of_this_machine(), repr(plain), repr(sorted(others.items())), XLA_FLAGS)
 
 
 @cache
@@ -156,11 +186,16 @@ def package_hash() -> str:
     """Of the text of this package, and of the data that come with it.
 
     Raises:
-      OSError: where that cannot be read.
+      OSError: where that cannot be read, is not there, or is not what was imported.
     """
-    made = hashlib.sha256()
-    for file in sorted(PACKAGE.rglob("*")):
+    made, files = hashlib.sha256(), sorted(PACKAGE.rglob("*"))
+    if not any(file.suffix == ".py" for file in files):
+        raise OSError
+    for file in files:
         if file.suffix in (".py", ".toml"):
+            status = file.stat()
+            if max(status.st_mtime, status.st_ctime) > IMPORTED:
+                raise OSError
             made.update(str(file.relative_to(PACKAGE)).encode() + b"\0" + file.read_bytes() + b"\0")
     return made.hexdigest()
 
@@ -168,6 +203,29 @@ def package_hash() -> str:
 def trace_settings() -> tuple:
     """JAX's settings that change what is traced or compiled."""
     return config.trace_context()
+
+
+def compile_settings() -> tuple:
+    """Those beside them that change how it is compiled."""
+    return tuple(map(jax.config.values.get, COMPILING))
+
+
+def has_foreign_methods() -> bool:
+    """Whether a class of this package has a function that is not from it: somebody has replaced one."""
+    for name, module in list(sys.modules.items()):
+        if name.partition(".")[0] != OURS or module is None:
+            continue
+        for kind in list(vars(module).values()):
+            if not (isinstance(kind, type) and kind.__module__ == name):
+                continue
+            for method in list(vars(kind).values()):
+                function = getattr(method, "fget", None) or getattr(method, "__func__", method)
+                if not isinstance(function, types.FunctionType):
+                    continue
+                origin = (function.__module__ or OURS).partition(".")[0]
+                if origin not in TRUSTED and not origin.startswith("namedtuple_"):
+                    REPLACED.add(f"{name}.{kind.__qualname__}.{function.__name__}")
+    return bool(REPLACED)
 
 
 class NotOurs(Exception):
@@ -194,6 +252,7 @@ def described(value: Any, traced: bool = False) -> Iterator[str]:
         for item in value:
             yield from described(item, traced)
     elif type(value) is dict:
+        yield f"dict {len(value)}"
         for key in sorted(value):
             yield repr(key)
             yield from described(value[key], traced)

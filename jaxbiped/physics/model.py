@@ -18,6 +18,7 @@ from jaxbiped.physics.mjcf_errors import mjcf_problem
 Watches = Mapping[str, Sequence[tuple[str, str]]]
 
 REPORT = sum(1 << int(f) for f in (mujoco.mjtConDataField.mjCONDATA_FOUND, mujoco.mjtConDataField.mjCONDATA_DIST))
+WORK = "work/"  # before the names of sensors of actuators
 PREFIX = "watch/"  # of the sensors that watch contacts; they come after the model's own
 
 
@@ -43,13 +44,15 @@ def load(source: Any, *, free_joint: bool = False, watch: Watches | None = None,
         model = copy.copy(source)
     else:
         spec, file = read(source)
-        add_watches(spec, watch or {})
-        if work:
-            add_power(spec)
         try:
+            add_watches(spec, watch or {})
+            if work:
+                add_power(spec)
             model = spec.compile()
         except ValueError as error:
             raise InputError(f"is no valid model: {mjcf_problem(error)}", file=file) from None
+    if (watch or work) and model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SENSOR:
+        raise InputError("must not be disabled: contacts and work are told by sensors", file=file, field="flag.sensor")
     if free_joint and mujoco.mjtJoint.mjJNT_FREE not in model.jnt_type:
         raise InputError("the model must have a free joint", file=file, field="joint")
     return model
@@ -97,8 +100,8 @@ def add_power(spec: mujoco.MjSpec) -> None:
         ("velocity", mujoco.mjtSensor.mjSENS_ACTUATORVEL),
     ):
         for k, actuator in enumerate(spec.actuators):
-            actuator.name = actuator.name or f"{PREFIX}actuator/{k}"
-            sensor = spec.add_sensor(name=f"{PREFIX}{kind}/{k}", type=sort)
+            actuator.name = actuator.name or f"{WORK}actuator/{k}"
+            sensor = spec.add_sensor(name=f"{WORK}{kind}/{k}", type=sort)
             sensor.objtype, sensor.objname = mujoco.mjtObj.mjOBJ_ACTUATOR, actuator.name
 
 
@@ -119,7 +122,7 @@ class Watched:
         pairs = [(i, f"{PREFIX}{name}/{k}") for i, name in enumerate(watch) for k in range(len(watch[name]))]
         columns = tuple(int(model.sensor(name).adr[0]) for _, name in pairs)
         forces, velocities = (
-            tuple(int(model.sensor(f"{PREFIX}{kind}/{k}").adr[0]) for k in range(model.nu if work else 0))
+            tuple(int(model.sensor(f"{WORK}{kind}/{k}").adr[0]) for k in range(model.nu if work else 0))
             for kind in ("force", "velocity")
         )
         own = min((*columns, *forces), default=model.nsensordata)

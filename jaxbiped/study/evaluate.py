@@ -144,7 +144,8 @@ def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
         mine = np.flatnonzero(group.population_of == population)
         arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
         settings = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.settings)
-        plan = jax.device_get(make(arenas, fill_up(settings, POINTS)))
+        several = POINTS if len(mine) == kinds else 1  # of many populations few have as many points
+        plan = jax.device_get(make(arenas, fill_up(settings, several)))
         for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(plan), strict=True):
             rows[mine] = found[: len(mine)]
     return out

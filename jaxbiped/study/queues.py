@@ -39,7 +39,8 @@ def run_all(
 
     Args:
       batch: [A], or [U * A] where there are `U` populations.
-      workers: by default as many as this process may use cores.
+      workers: at most so many queues, by default as many as this process may use cores; fewer where each would have
+        more slots than jobs.
       slots: of each queue. XLA fuses a program by its sizes, and what it fuses otherwise may round otherwise: rows are
         the same, bit for bit, among runs of as many slots, so that few jobs have as many as many do.
       population_of: which of these each point is about; by default the first.
@@ -51,7 +52,7 @@ def run_all(
     real = arena < count
     arena, point = np.concatenate([arena[real], arena[~real]]), np.concatenate([point[real], point[~real]])
     devices = devices or jax.local_devices()
-    queues = len(devices) if len(devices) > 1 else max(1, min(workers or cores(), count * kinds))
+    queues = len(devices) if len(devices) > 1 else max(1, min(workers or cores(), -(-count * kinds // slots)))
     length = filled(-(-size * kinds // queues), JOBS)
     batch, points = fill_up(batch, ARENAS), fill_up(points, POINTS)
     hands = []
@@ -70,7 +71,7 @@ def run_all(
         results = [jax.tree.map(lambda leaf, number=number: leaf[number], result) for number in range(queues)]
     else:
         results = run_threads(compile_queue(batch, points, hands[0], static, slots), batch, points, hands, on_progress)
-    out = jax.tree.map(lambda leaf: np.zeros((kinds, count), leaf.dtype), results[0])
+    out = jax.tree.map(lambda leaf: np.zeros((kinds, count, *leaf.shape[1:]), leaf.dtype), results[0])
     for number, result in enumerate(results):
         mine = np.arange(number, count * kinds, queues)
         for all_rows, rows in zip(jax.tree.leaves(out), jax.tree.leaves(result), strict=True):

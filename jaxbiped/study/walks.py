@@ -34,4 +34,4 @@ def walk_all(
     place = arena + seeds.shape[0] * population_of[point]
     jobs = Jobs(jnp.asarray(place), jnp.asarray(point), seeds[arena], jnp.int32(len(arena)))
     result = walk(batch, points, jobs, static, config, on_progress, eyes=eyes)
-    return jax.tree.map(lambda leaf: leaf.reshape(kinds, count), result)
+    return jax.tree.map(lambda leaf: leaf.reshape(kinds, count, *leaf.shape[1:]), result)

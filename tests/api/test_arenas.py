@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 
 import jaxbiped as jb
+from jaxbiped.api.study import numbers_of_axis
 from jaxbiped.arenas import sample
 from jaxbiped.study.comparison import strata
 
@@ -65,6 +66,20 @@ def test_a_generator_is_a_family_among_others():
 def test_arenas_that_are_none_are_named(arenas, match):
     with pytest.raises(jb.InputError, match=match):
         jb.evaluate(jb.Study(arenas(), ["full"]))
+
+
+def test_boxes_keep_their_contrast_and_only_lists_hold_them():
+    plain = jb.Box(centre=(0.9, 0.7), size=(0.2, 0.4), top=0.3, contrast=0.1)
+    made = jb.make_arena([(0.5, 0.5, 0, 0.1, 0.1, 0, 0.2), plain], (0.3, 0.7, 0.0), (1.5, 0.7))
+    np.testing.assert_allclose(made.boxes.contrast[:3], [1.0, 0.1, 1.0])
+    with pytest.raises(jb.InputError, match="boxes: must be a list of boxes"):
+        jb.make_arena(plain, (0.3, 0.7, 0.0), (1.5, 0.7))
+    with pytest.raises(jb.InputError, match="metrics: must be a list"):
+        jb.Study(jb.RandomArenas(count=2), metrics="spl")
+    with pytest.raises(jb.InputError, match="metrics: must be a name"):
+        jb.Study(jb.RandomArenas(count=2), metrics=[len])
+    with pytest.raises(jb.InputError, match=r"axes\.costs\.c3: must be a list of numbers"):
+        numbers_of_axis("costs.c3", 1)
 
 
 def test_boxes_may_be_objects():

@@ -32,8 +32,18 @@ Slippery = example("09_own_executor").Slippery
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Hopeless(jb.Metric):
+    """1 where a robot failed, as a matrix says that it remembers; NaN where it did not."""
+
+    def start(self, arena, settings):
+        return {"counts": jnp.zeros((2, 3)), "some": jnp.zeros((), bool)}
+
+    def update(self, state, step):
+        return {"counts": state["counts"].at[1, 2].add(1.0), "some": state["some"] | True}
+
     def result(self, state, end):
-        return jnp.where(end.result.code == jb.Code.REACHED, jnp.nan, 1.0), True & (end.result.code >= 0)
+        counted = (state["counts"][1, 2] == end.result.decisions) & (state["counts"].sum() == end.result.decisions)
+        one = jnp.where(counted & state["some"], 1.0, 2.0)
+        return jnp.where(end.result.code == jb.Code.REACHED, jnp.nan, one), True & (end.result.code >= 0)
 
 
 AXES = {"executor.chance": [0.0, 1.0], "sensor.reach": [9.0, 0.05]}

@@ -4,6 +4,7 @@ import enum
 import os
 import subprocess
 import sys
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from jaxbiped.planning.costs import Costs
 
 SCRIPT = """
 import sys
+import time
 import jax, jax.numpy as jnp, numpy as np
 from jaxbiped.core.ready_programs import ready_jit
 
@@ -200,3 +202,54 @@ print(sorted(REPLACED))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n['jaxbiped.arenas.families.MAX_BOXES', 'jaxbiped.mission.queue.TURNS']\n"
+
+
+PATCHED = """
+import sys
+import time
+import jaxbiped as jb
+from jaxbiped.core import ready_programs
+import jaxbiped.study.evaluate, jaxbiped.api.results, jaxbiped.report.page, jaxbiped.mission.walking
+print(ready_programs.has_foreign_methods(), sorted(ready_programs.REPLACED))
+def blind(self, *_):
+    raise AssertionError
+jb.Oracle.measure = blind
+print(ready_programs.has_foreign_methods(), sorted(ready_programs.REPLACED))
+"""
+
+
+def test_replacing_a_method_of_a_class_is_seen(tmp_path):
+    said = run(tmp_path, PATCHED).splitlines()
+    assert said == ["False []", "True ['jaxbiped.mission.sensors.Oracle.blind']"]
+
+
+def test_files_that_were_edited_since_they_were_read_are_not_trusted(tmp_path, monkeypatch):
+    ready_programs.package_hash.cache_clear()
+    here = tmp_path / "package"
+    here.mkdir()
+    (here / "module.py").write_text("a = 1\n")
+    monkeypatch.setattr(ready_programs, "PACKAGE", here)
+    with pytest.raises(OSError):  # it is newer than this process
+        ready_programs.package_hash()
+    monkeypatch.setattr(ready_programs, "IMPORTED", time.time() + 5)
+    first = ready_programs.package_hash()
+    (here / "module.py").write_text("a = 2\n")
+    ready_programs.package_hash.cache_clear()
+    assert ready_programs.package_hash() != first
+    (here / "module.py").rename(here / "module.txt")
+    ready_programs.package_hash.cache_clear()
+    with pytest.raises(OSError):  # there is no text
+        ready_programs.package_hash()
+    monkeypatch.undo()
+    ready_programs.package_hash.cache_clear()
+    REPLACED.clear()
+
+
+def test_settings_of_the_compiler_count(tmp_path, monkeypatch):
+    once = "[(np.arange(5.0), 2)]"
+    run(tmp_path, SCRIPT, once)
+    for name, value in (("JAX_DISABLE_MOST_OPTIMIZATIONS", "1"), ("JAX_OPTIMIZATION_LEVEL", "O0")):
+        assert "traced" in run(tmp_path, SCRIPT, once, **{name: value})
+    before = len(ready_files(tmp_path))
+    assert "traced" in run(tmp_path, SCRIPT, "[(np.arange(7.0), 2)]", JAX_ENABLE_COMPILATION_CACHE="0")
+    assert len(ready_files(tmp_path)) == before

@@ -159,3 +159,15 @@ def test_work_is_not_told_where_it_is_not_asked_for_or_not_known():
     assert np.isnan(state.work[0]).all() and state.work[1] > 0 and state.valid.tolist() == [False, True]
     with pytest.raises(InputError, match="work: sensors are added to MJCF"):
         physics.make("native", mujoco.MjModel.from_xml_string(PENDULUM), 1, work=True)
+
+
+def test_names_of_watches_do_not_clash_with_those_of_actuators():
+    batch = physics.make("native", HOPPER, 1, watch={"force": WATCH["step"], "actuator": WATCH["step"]}, work=True)
+    assert batch.advance(np.full((1, 5, 1), 0.1)).work[0, 0] > 0
+
+
+@pytest.mark.parametrize("options", [{"work": True}, {"watch": WATCH}])
+def test_sensors_must_not_be_disabled(options):
+    model = HOPPER.replace("<default>", '<option><flag sensor="disable"/></option><default>')
+    with pytest.raises(InputError, match=r"flag\.sensor: must not be disabled"):
+        physics.make("native", model, 1, **options)
