@@ -133,7 +133,9 @@ def ready(
 
 
 def may_be_ready(leaves: list) -> bool:
-    """Whether arguments are arrays on the one device, or numbers."""
+    """Whether arguments are arrays on the one device, or numbers, and nothing of this package was replaced."""
+    if REPLACED:  # whoever did so may want programs traced anew, by `jax.clear_caches`
+        return False
     if jax.config.jax_disable_jit or not has_one_device():
         return False
     if any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):

@@ -111,6 +111,25 @@ def scaled(x, y=2.0, *, times):
     return (x + y) * times
 
 
+def test_what_was_replaced_is_traced_anew(monkeypatch):
+    seen = []
+
+    @ready_jit
+    def noted(x):
+        seen.append(x)
+        return x + 1
+
+    REPLACED.clear()
+    assert (noted(1.0), noted(2.0)) == (2.0, 3.0)
+    monkeypatch.setattr(ready_programs, "KIND", b"other")
+    before = len(seen)
+    assert noted(1.0) == 2.0 and len(seen) == before + 1
+    jax.clear_caches()
+    assert noted(1.0) == 2.0 and len(seen) == before + 2
+    monkeypatch.undo()
+    REPLACED.clear()
+
+
 def test_it_is_a_function_like_any_other():
     assert scaled.__name__ == "scaled" and scaled.__doc__
     x = jnp.arange(3.0)
