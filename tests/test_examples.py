@@ -19,7 +19,6 @@ def test_examples_are_short_and_use_the_public_names_alone(path):
     assert text.startswith('"""') and path.name in text.split('"""')[1]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_run(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

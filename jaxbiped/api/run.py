@@ -38,7 +38,7 @@ def evaluate(
 
 def sweep(
     study: Study,
-    axes: Mapping[str, Sequence[float]],
+    axes: Mapping[str, Sequence[float | int]],
     out: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Results:
