@@ -100,7 +100,7 @@ class Study:
         object.__setattr__(self, "own", tuple(named(item) for item in self.strategies if not isinstance(item, str)))
         self.config()
 
-    def config(self, axes: Mapping[str, Sequence[float]] | None = None) -> StudyConfig:
+    def config(self, axes: Mapping[str, Sequence[float | int]] | None = None) -> StudyConfig:
         """The config that a command line would have; its strategies are registered.
 
         Args:
