@@ -17,13 +17,12 @@ from jaxbiped.mission.execution import Executor
 from jaxbiped.mission.metric import Metric, as_metric, column_of
 from jaxbiped.mission.sensors import Sensor
 from jaxbiped.mission.strategies import Strategy, as_strategy
-from jaxbiped.study.names import METRICS as DEFAULT_METRICS
-from jaxbiped.study.names import MORE_METRICS
+from jaxbiped.study.names import BUILT_IN_METRICS
 from jaxbiped.study.names import STRATEGIES as BUILT_IN_STRATEGIES
 
 NAME = re.compile(r"[A-Za-z][\w.+-]{0,39}")  # of a sensor or an executor
 KINDS = (
-    (Metric, METRICS, (*DEFAULT_METRICS, *MORE_METRICS)),
+    (Metric, METRICS, BUILT_IN_METRICS),
     (Sensor, SENSORS, BUILT_IN_SENSORS),
     (Executor, EXECUTORS, BUILT_IN_EXECUTORS),
 )

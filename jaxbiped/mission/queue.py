@@ -137,15 +137,15 @@ def compile_queue(
             begun = on_each(on_row(begun, 2), mesh, (ALL, ALL, EACH))
             turned = on_each(on_row(turned, 0, 3), mesh, (EACH, ALL, ALL, EACH), donate_argnums=0)
         queue = jax.eval_shape(begun, arenas, settings, jobs)
-        first, further = (arenas, settings, jobs), (queue, arenas, settings, jobs)
+        given, going = (arenas, settings, jobs), (queue, arenas, settings, jobs)
         if mesh is None:
             static = program, slots, TURNS
             COMPILED[signature] = (
-                ready("fill", first, static, lambda: begun.lower(*first)),
-                ready("segment", further, static, lambda: turned.lower(*further), wide),
+                ready("queue.fill", given, static, lambda: begun.lower(*given)),
+                ready("queue.segment", going, static, lambda: turned.lower(*going), wide),
             )
         else:
-            COMPILED[signature] = begun.lower(*first).compile(), wide(turned.lower(*further))
+            COMPILED[signature] = begun.lower(*given).compile(), wide(turned.lower(*going))
     first, further = COMPILED[signature]
 
     @with_own_settings

@@ -160,9 +160,8 @@ class Mjx:
         """See `Backend.compile`."""
         begin = time.perf_counter()
         block = np.zeros((self.options.block, self.batch_size, self.model.nu), np.float32)
-        overrides, data = self.overridden(self.living), self.data
-        before = self.warned, self.untouched(), self.no_work()
-        out = self.block(self.engine.model, overrides, data, *before, block, np.int32(0))
+        told = self.warned, self.untouched(), self.no_work()
+        out = self.block(self.engine.model, self.overridden(self.living), self.data, *told, block, np.int32(0))
         jax.block_until_ready(out)
         return time.perf_counter() - begin
 
@@ -229,9 +228,7 @@ class Mjx:
         """Step a batch `steps` times: its data, warnings, deepest contacts, work, and a record of each step."""
         self.traces += 1
 
-        def one(
-            own: dict[str, Array], data: Any, control: Float[Array, "nu"]
-        ) -> tuple[Any, Array, Array, Array, Array]:
+        def one(own: dict[str, Array], data: Any, control: Float[Array, "nu"]) -> tuple[Any, ...]:
             data, sensed = self.engine.step(model, own, data, control), self.watched
             row = jnp.concatenate([data.qpos, data.qvel, data.sensordata[: sensed.own]])
             seen = sensed.depths(data.sensordata, jnp), sensed.power(data.sensordata, jnp)
@@ -296,8 +293,7 @@ class Mjx:
 
     def no_work(self) -> Float[Array, "B nw"]:
         """None yet."""
-        shape = self.batch_size, len(self.watched.forces)
-        return jnp.zeros(shape, self.data.qpos.dtype, device=self.engine.device)
+        return jnp.zeros((self.batch_size, len(self.watched.forces)), self.data.qpos.dtype, device=self.engine.device)
 
     def untouched(self) -> Float[Array, "B W"]:
         """No contacts yet."""

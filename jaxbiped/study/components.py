@@ -12,7 +12,7 @@ from jaxbiped.mission.metric import column_of, find_metric
 from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.names import METRICS, MORE_METRICS, STRATEGIES
+from jaxbiped.study.names import BUILT_IN_METRICS, STRATEGIES
 
 FAMILY, METRIC, SENSOR, EXECUTOR = "family", "metric", "sensor", "executor"  # before the names of these
 
@@ -38,7 +38,7 @@ def fingerprinted(config: C) -> C:
         if not isinstance(family, str):
             made[f"{FAMILY} {family.name}"] = family.digest()
     for name in config.metrics:
-        if name not in (*METRICS, *MORE_METRICS):
+        if name not in BUILT_IN_METRICS:
             made[f"{METRIC} {column_of(name)}"] = component_hash(find_metric(name))
     for kind, name, built_in, find in (
         (SENSOR, config.mission.sensor, SENSORS, find_sensor),

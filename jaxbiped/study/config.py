@@ -14,7 +14,7 @@ from jaxbiped.core.registry import METRICS as METRICS_OWN
 from jaxbiped.core.registry import STRATEGIES as REGISTERED
 from jaxbiped.core.registry import known_name
 from jaxbiped.mission.config import SIMULATED, MissionConfig
-from jaxbiped.study.names import FAMILIES, KNOWN, METRICS, MORE_METRICS, MOVING, STRATEGIES
+from jaxbiped.study.names import BUILT_IN_METRICS, FAMILIES, KNOWN, METRICS, MOVING, STRATEGIES
 
 OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # what the names of components' numbers begin with
 
@@ -40,7 +40,7 @@ StrategyName = Annotated[str, pydantic.AfterValidator(known_strategy)]
 
 def known_metric(name: str) -> str:
     """The same of a metric."""
-    return known_name(name, (*METRICS, *MORE_METRICS), METRICS_OWN, "metric")
+    return known_name(name, BUILT_IN_METRICS, METRICS_OWN, "metric")
 
 
 MetricName = Annotated[str, pydantic.AfterValidator(known_metric)]

@@ -11,5 +11,5 @@ MOVING = frozenset({"traffic"})
 KNOWN = (*FAMILIES, *MOVING)
 SCENE = "scene"  # the family of an arena that was written by hand
 METRICS = ("spl", "clearance", "replans", "measuring")  # of a study that names none
-MORE_METRICS = ("energy",)  # that are built in, too
+BUILT_IN_METRICS = (*METRICS, "energy")
 MEASURES = ("success", "distance", "time")  # whose differences strategies are compared by

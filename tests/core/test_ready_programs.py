@@ -13,9 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.core import ready_programs
+from jaxbiped.core import program_key, ready_programs
 from jaxbiped.core.lazy_package import REPLACED
-from jaxbiped.core.ready_programs import NotOurs, described, program_file, ready_jit
+from jaxbiped.core.program_key import NotOurs, described
+from jaxbiped.core.ready_programs import program_file, ready_jit
 from jaxbiped.mission.outcome import Code
 from jaxbiped.planning.costs import Costs
 
@@ -196,14 +197,14 @@ def test_nothing_is_kept_once_the_package_was_changed(tmp_path, monkeypatch):
     monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
     REPLACED.clear()
     before = program_file("name", (np.zeros(3),), 1)
-    monkeypatch.setattr(ready_programs, "package_hash", lambda: "other")
-    ready_programs.of_this_machine.cache_clear()
-    assert before and "jaxbiped.core.ready_programs.package_hash" in REPLACED
+    monkeypatch.setattr(program_key, "package_hash", lambda: "other")
+    program_key.of_this_machine.cache_clear()
+    assert before and "jaxbiped.core.program_key.package_hash" in REPLACED
     assert program_file("name", (np.zeros(3),), 1) is None
     REPLACED.clear()
     assert program_file("name", (np.zeros(3),), 1) not in (None, before)
     monkeypatch.undo()
-    ready_programs.of_this_machine.cache_clear()
+    program_key.of_this_machine.cache_clear()
     REPLACED.clear()
 
 
@@ -224,16 +225,14 @@ print(sorted(REPLACED))
 
 
 PATCHED = """
-import sys
-import time
 import jaxbiped as jb
-from jaxbiped.core import ready_programs
 import jaxbiped.study.evaluate, jaxbiped.api.results, jaxbiped.report.page, jaxbiped.mission.walking
-print(ready_programs.has_foreign_methods(), sorted(ready_programs.REPLACED))
+from jaxbiped.core import program_key
+print(program_key.has_foreign_methods(), sorted(program_key.REPLACED))
 def blind(self, *_):
     raise AssertionError
 jb.Oracle.measure = blind
-print(ready_programs.has_foreign_methods(), sorted(ready_programs.REPLACED))
+print(program_key.has_foreign_methods(), sorted(program_key.REPLACED))
 """
 
 
@@ -243,24 +242,24 @@ def test_replacing_a_method_of_a_class_is_seen(tmp_path):
 
 
 def test_files_that_were_edited_since_they_were_read_are_not_trusted(tmp_path, monkeypatch):
-    ready_programs.package_hash.cache_clear()
+    program_key.package_hash.cache_clear()
     here = tmp_path / "package"
     here.mkdir()
     (here / "module.py").write_text("a = 1\n")
-    monkeypatch.setattr(ready_programs, "PACKAGE", here)
+    monkeypatch.setattr(program_key, "PACKAGE", here)
     with pytest.raises(OSError):  # it is newer than this process
-        ready_programs.package_hash()
-    monkeypatch.setattr(ready_programs, "IMPORTED", time.time() + 5)
-    first = ready_programs.package_hash()
+        program_key.package_hash()
+    monkeypatch.setattr(program_key, "IMPORTED", time.time() + 5)
+    first = program_key.package_hash()
     (here / "module.py").write_text("a = 2\n")
-    ready_programs.package_hash.cache_clear()
-    assert ready_programs.package_hash() != first
+    program_key.package_hash.cache_clear()
+    assert program_key.package_hash() != first
     (here / "module.py").rename(here / "module.txt")
-    ready_programs.package_hash.cache_clear()
+    program_key.package_hash.cache_clear()
     with pytest.raises(OSError):  # there is no text
-        ready_programs.package_hash()
+        program_key.package_hash()
     monkeypatch.undo()
-    ready_programs.package_hash.cache_clear()
+    program_key.package_hash.cache_clear()
     REPLACED.clear()
 
 

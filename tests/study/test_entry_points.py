@@ -10,58 +10,28 @@ import pytest
 EXAMPLES = Path(__file__).parents[2] / "sweeps" / "examples"
 OFFERS = """
 [jaxbiped.planners]
-lab-afraid = lab_parts:Fearful
+lab-careful = lab_planner:Clearance
 [jaxbiped.arenas]
-lab-pillars = lab_parts:pillars
+lab-corridor = lab_arenas:corridor
 [jaxbiped.sensors]
-lab-fog = lab_parts:Foggy
+lab-fog = lab_sensor:ShortSighted
 [jaxbiped.executors]
-lab-slip = lab_parts:Slippery
+lab-slip = lab_executor:Slippery
 [jaxbiped.metrics]
-lab_turns = lab_parts:Turned
+lab_turns = lab_metric:TurnedAngle
 """
-PARTS = """
-from dataclasses import dataclass
-
-import jax
-import jax.numpy as jnp
-
-import jaxbiped as jb
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Fearful(jb.GridPlanner):
-    fear: float = 1.0
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Foggy(jb.RayCast):
-    reach: float = 1.0
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Slippery(jb.Kinematic):
-    slip: float = 0.1
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Turned(jb.Metric):
-    def result(self, state, end):
-        return jnp.float32(1), jnp.bool_(True)
-
-
-def pillars(key):
-    return jb.make_arena([jb.Box(centre=(0.9, 0.7), size=(0.2, 0.2), top=0.3)], (0.3, 0.7, 0.0), (1.5, 0.7))
-"""
+PARTS = {
+    "lab_planner": "planners/clearance",
+    "lab_arenas": "06_own_arenas",
+    "lab_metric": "07_own_metric",
+    "lab_sensor": "08_own_sensor",
+    "lab_executor": "09_own_executor",
+}  # modules of the package, which are the examples
 SCRIPT = """
 import jaxbiped as jb
 from jaxbiped.study.groups import groups_of
 
-study = jb.Study(jb.RandomArenas(families=["bump", "lab-pillars"], count=2), ["full", "lab-afraid"],
+study = jb.Study(jb.RandomArenas(families=["bump", "lab-corridor"], count=2), ["full", "lab-careful"],
                  sensor="lab-fog", executor="lab-slip", metrics=["spl", "lab_turns"])
 groups = groups_of(study.config(), None)
 names = [name for group in groups for name in group.strategies]
@@ -82,7 +52,8 @@ def installed(tmp_path):
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-parts\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(OFFERS)
-    (tmp_path / "lab_parts.py").write_text(PARTS)
+    for module, example in PARTS.items():
+        (tmp_path / f"{module}.py").write_text((EXAMPLES / f"{example}.py").read_text())
     path = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
     return os.environ | {"PYTHONPATH": path}
 
@@ -91,13 +62,13 @@ def test_all_five_kinds_are_found_by_name(installed):
     done = subprocess.run([sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=installed, check=False)
     assert done.returncode == 0, done.stderr
     strategies, parts, families, refused = done.stdout.splitlines()
-    assert strategies == "['full', 'lab-afraid'] ['GridPlanner', 'Fearful']"
-    assert parts == "('spl', 'lab_turns') Foggy Slippery"
-    assert families == "['bump', 'lab-pillars']"
-    assert "lab-afraid" in refused and "nobody" in refused
+    assert strategies == "['full', 'lab-careful'] ['GridPlanner', 'Clearance']"
+    assert parts == "('spl', 'lab_turns') ShortSighted Slippery"
+    assert families == "['bump', 'lab-corridor']"
+    assert "lab-careful" in refused and "nobody" in refused
 
 
 def test_the_command_line_lists_them(installed):
     command = [sys.executable, "-m", "jaxbiped", "compare", "--strategies", "full", "nobody"]
     done = subprocess.run(command, capture_output=True, text=True, env=installed, check=False)
-    assert done.returncode == 2 and "lab-afraid" in done.stderr and "lab_parts" not in done.stderr
+    assert done.returncode == 2 and "lab-careful" in done.stderr and "lab_planner" not in done.stderr
