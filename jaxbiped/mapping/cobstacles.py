@@ -18,7 +18,7 @@ from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, patch_sum
 from jaxbiped.mapping.params import MapParams
-from jaxbiped.mapping.relief import Relief, Surfaces, greater, is_untenable, read_relief
+from jaxbiped.mapping.relief import Relief, Surfaces, greater, greatest_within, is_untenable, read_relief
 
 
 @checked(numbers=("evidence", "surfaces", "body", "params"))
@@ -78,14 +78,22 @@ def solid_levels(
     """Those of the occupied levels (`columns`) that are no phantoms.
 
     A stereo matcher's phantoms are single clumps of few pixels. So a solid voxel has `params.solid_points` within the
-    patch of about 5 x 5 cm around it (at least its own cell) and another such voxel among its 26 neighbours. Below such
-    a voxel, down to the first gap, `params.below_points` are enough, where that is not None.
+    patch of about 5 x 5 cm around it (at least its own cell) and another such voxel among its 26 neighbours. And at an
+    edge a matcher mixes what lies before it with what lies behind, view by view: a solid voxel has a share of
+    `params.voxel_share` of the points of each patch within 5 cm, one level higher or lower. Below a solid voxel, down
+    to the first gap, `params.below_points` are enough, where that is not None.
     """
     height, width = columns.shape
-    evidence = jnp.moveaxis(patch_sum(jnp.moveaxis(evidence, -1, 0), spec), 0, -1)
-    dense = columns & pack(evidence >= params.solid_points, spec)
+    points = patch_sum(jnp.moveaxis(evidence, -1, 0), spec)
+    padded = jnp.pad(points, ((1, 1), (0, 0), (0, 0)))
+    leaking = greatest_within(greater(padded[:-2], padded[2:]), spec.beside)
+
+    def pack_planes(voxels):
+        return pack(jnp.moveaxis(voxels, 0, -1), spec)
+
+    dense = columns & pack_planes((points >= params.solid_points) & (points >= params.voxel_share * leaking))
     if params.below_points is not None:
-        dense = downwards(dense, columns & pack(evidence >= params.below_points, spec))
+        dense = downwards(dense, columns & pack_planes(points >= params.below_points))
     others = dense << 1 | dense >> 1
     around = jnp.pad(dense | others, 1)
     for i, j in itertools.product(range(3), range(3)):

@@ -25,7 +25,9 @@ class MapConfig(Model):
     voxel_points: float = Field(2.0, ge=0)
     """a voxel with fewer points is empty, in one view and in the fused evidence"""
     voxel_share: float = Field(0.05, ge=0, lt=1)
-    """a voxel with a smaller share of the points of one right above or below is empty: noise leaked out of that one"""
+    """a voxel with a smaller share of the points of one right above or below is empty: noise leaked out of that one;
+    and a patch of 5 x 5 cm with a smaller share of those of one within 5 cm, one level higher or lower, bars no way:
+    it is a mixture at the edge of that one"""
     solid_points: float = Field(144.0, ge=0)
     """a patch of 5 x 5 cm of one level with fewer points bars no way: it may be a phantom, a clump of wild disparity;
     three rays of 64 x 64"""
@@ -77,7 +79,8 @@ class ChartConfig(Model):
     voxel: float = Field(0.25, ge=0)
     """[cm2] a voxel with less is empty"""
     voxel_share: float = Field(0.05, ge=0, lt=1)
-    """a voxel with a smaller share of the surface of one right above or below is empty: noise leaked out of that one"""
+    """a voxel with a smaller share of the surface of one right above or below is empty: noise leaked out of that one;
+    and a patch of 5 x 5 cm with a smaller share of that of one within 5 cm, one level higher or lower, bars no way"""
     solid: float = Field(6.0, ge=0)
     """[cm2] a patch of 5 x 5 cm of one level with less bars no way: it may be a phantom; a face of a wall has 15"""
     cell: float = Field(1.25, gt=0)

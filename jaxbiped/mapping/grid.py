@@ -95,6 +95,11 @@ class GridSpec:
         """A cell's area as a share of 5 x 5 cm, the cell that thresholds on numbers of points are stated for."""
         return (self.pitch / 0.05) ** 2
 
+    @property
+    def beside(self) -> int:
+        """How many cells next to a cell make up 5 cm; at least one."""
+        return max(round(0.05 / self.pitch), 1)
+
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)

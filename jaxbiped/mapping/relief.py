@@ -19,6 +19,7 @@ from jaxbiped.sensing.view import View
 SURE = 2.0  # standard errors that a height must be off, to be off
 EDGE = 0.010  # [m] two surfaces of one cell lie further apart; nearer, they are one, between two levels
 FACE = 0.004  # [m] below the mean of a raised level: what is lower is no top, but the face below it
+SHARE = 0.1  # of the points of a surface next to it, below which a surface is none, but a matcher's mixture at its edge
 
 
 @jax.tree_util.register_dataclass
@@ -91,8 +92,12 @@ def read_relief(
 
     The mean of a surface is that of the patch of about 5 x 5 cm around a cell (at least the cell), and is told to
     `SURE` standard errors of as many pixels (`params.height_sd`). Where the ground may be a phantom, and in a cell that
-    holds an edge, whose face blurs it, it is at the height of its level. What is high is so in two neighbouring cells:
-    in one alone it is a matcher's mixture of what lies before an edge and behind it.
+    holds an edge, whose face blurs it, it is at the height of its level.
+
+    A matcher mixes what lies before an edge with what lies behind it, so a few points hang in the air past the edge,
+    up to 1 cm above it. Hence what is high is so in two neighbouring cells; and since such points lie along the whole
+    of an edge, a cell's surface counts as a top only where it has `SHARE` of the points that a cell within 5 cm has
+    there.
 
     Args:
       columns: masks of the occupied levels; `solid` of those that are no phantoms.
@@ -101,6 +106,7 @@ def read_relief(
     levels = range(spec.ground_levels)
     mean = [level * jnp.float32(spec.level_height) + rise[level] / many[level] for level in levels]
     error = [SURE * params.height_sd / jnp.sqrt(many[level]) for level in levels]
+    most = greatest_within(surfaces.weight, spec.beside)
     height = ground * jnp.float32(spec.level_height)
     sd, top = jnp.zeros(ground.shape), jnp.full(ground.shape, -jnp.inf)
     for level in levels:
@@ -110,7 +116,8 @@ def read_relief(
             known &= ~(above & (mean[level + 1] - mean[level] > EDGE))
         here = known & (ground == level)
         height, sd = jnp.where(here, mean[level], height), jnp.where(here, error[level], sd)
-        top = jnp.where(known, mean[level] - error[level], top)
+        whole = surfaces.weight[level] >= SHARE * most[level]
+        top = jnp.where(known & whole, mean[level] - error[level], top)
     return Relief(height, sd, jnp.minimum(top, neighbours(top, greater, -jnp.inf)))
 
 
@@ -133,6 +140,20 @@ def is_untenable(relief: Relief, ground: Int[Array, "H W"], body: Body, spec: Gr
 def greater(a: Array, b: Array) -> Array:
     """The greater of two arrays without NaN; `jnp.maximum` carries NaN along, and is several times slower for it."""
     return jnp.where(a > b, a, b)
+
+
+def greatest_within(planes: Float[Array, "K H W"], reach: int) -> Float[Array, "K H W"]:
+    """In each plane the greatest of each cell and those up to `reach` cells from it, across and along."""
+    for axis in (1, 2):
+        width = 1
+        margins = [(reach, reach) if a == axis else (0, 0) for a in range(3)]
+        planes = jnp.pad(planes, margins, constant_values=-jnp.inf)
+        while width < 2 * reach + 1:  # each entry is the greatest of `width` from it on
+            step = min(width, 2 * reach + 1 - width)
+            left = planes.shape[axis] - step
+            planes = greater(*(jax.lax.slice_in_dim(planes, first, first + left, axis=axis) for first in (0, step)))
+            width += step
+    return planes
 
 
 def neighbours(values: Float[Array, "H W"], combine, nothing: float) -> Float[Array, "H W"]:

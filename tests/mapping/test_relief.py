@@ -12,7 +12,7 @@ from jaxbiped.mapping import MapConfig, classify, empty, ground_height, update
 from jaxbiped.mapping.cobstacles import ground_level as level_of
 from jaxbiped.mapping.cobstacles import occupied_levels, solid_levels
 from jaxbiped.mapping.grid import Cell, GridSpec
-from jaxbiped.mapping.relief import read_relief
+from jaxbiped.mapping.relief import greatest_within, read_relief
 from tests.mapping.scenes import BODY, ORIGIN, plane, view, wall
 
 PARAMS = MapConfig(max_range=9.0).params()
@@ -137,6 +137,37 @@ def test_height_in_one_cell_alone_is_a_mixture():
     assert (np.asarray(lone)[:, :7] == Cell.FLOOR).all()
     more = np.concatenate([points, plane((0.4, 0.45), (0.15, 0.2), 0.04, 0.006)])
     assert np.asarray(look(view(more, 64.0))[0])[4, 6] == Cell.OBSTACLE
+
+
+@pytest.mark.parametrize("pitch", PITCHES)
+@pytest.mark.parametrize("above", [0.004, 0.013])
+def test_few_points_along_an_edge_are_a_mixture(above, pitch):
+    """Past the far edge of a bump a matcher leaves points in the air; they made the floor there an obstacle."""
+
+    def classes(weight):
+        """With points that hang 2.5 cm wide behind a bump, each of which weighs so much."""
+        hung = plane((0.5, 0.525), (0, 0.4), 0.03 + above, 0.006)
+        ground = [plane((0, 0.3), (0, 0.4), 0.0, 0.006), plane((0.5, 0.8), (0, 0.4), 0.0, 0.006)]
+        ground += [plane((0.3, 0.5), (0, 0.4), 0.03, 0.006), wall((0.3, 0.3), (0, 0.4), (0, 0.03), 0.006)]
+        ground = np.concatenate(ground)
+        seen = view(np.concatenate([ground, hung]), 64.0)
+        weights = np.concatenate([np.full(len(ground), 64.0), np.full(len(hung), weight)])
+        seen = replace(seen, weight=seen.weight.at[: len(weights)].set(weights))
+        return np.asarray(look(seen, spec=GridSpec(**SIZE, pitch=pitch))[0])
+
+    assert not np.isin(classes(5.0), [Cell.OBSTACLE, Cell.GATE]).any()  # as many as were seen in missions: 4 %
+    floor = int(0.6 / pitch)
+    assert above < 0.01 or (classes(64.0)[1:-1, floor] == Cell.OBSTACLE).all()  # a bar of its own
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1), (2, 1, 7), (1, 9, 1), (3, 5, 4), (2, 28, 36)])
+def test_the_greatest_within_a_reach(shape):
+    planes = np.random.default_rng(0).choice([-np.inf, -1.0, 0.0, 0.5, 1e30], shape).astype(np.float32)
+    for reach in (1, 2, 3, 4, 5, 13, 40):
+        expected = np.full(shape, -np.inf, np.float32)
+        for k, i, j in np.ndindex(shape):
+            expected[k, i, j] = planes[k, max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1].max()
+        np.testing.assert_array_equal(greatest_within(jnp.asarray(planes), reach), expected)
 
 
 def test_a_robot_stands_as_high_as_its_ground_was_measured():

@@ -13,12 +13,14 @@ from jaxbiped.arenas.scene import load_scene
 from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.library import PLAYED, load_library
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.queue import stack
 from jaxbiped.mission.sampled import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.mission.stepped import run_logged
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing.odometry import OdometryConfig
+from jaxbiped.study.queues import run_all
 from tests.mission.test_failures import scene
 
 CONFIG = MissionConfig(executor="sampled")
@@ -207,3 +209,14 @@ def test_the_papers_scenes_are_solved(number):
     _, arena = load_scene(f"configs/scenes/experiment_{number}.toml")
     static = program(CONFIG, tuple(round(float(v), 6) for v in arena.size_xy))
     assert run_logged(arena, SETTINGS, jnp.uint32(1), static).code == Code.REACHED
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [3, 4])
+def test_scenes_with_bumps_are_solved_whatever_the_seed(number):
+    """Points in the air past the edges of bumps made 45 of 768 such missions fail; simulated falls are rarer by far."""
+    _, arena = load_scene(f"configs/scenes/experiment_{number}.toml")
+    static = program(CONFIG, tuple(round(float(v), 6) for v in arena.size_xy))
+    arenas, settings = stack([jax.device_get(arena)] * 256), stack([SETTINGS])
+    ended = run_all(*jax.tree.map(jnp.asarray, (arenas, seeds(256), settings)), 256, static, lambda _: None, slots=64)
+    assert np.sum(np.asarray(ended.code) != Code.REACHED) <= 4  # at most 0 were seen; chance, at 2 of 768, gives 0.7

@@ -23,7 +23,7 @@ from jaxbiped.mapping.leveling import (
     ROUNDS,
     SAMPLE,
 )
-from jaxbiped.mapping.relief import EDGE, FACE, SURE, Surfaces
+from jaxbiped.mapping.relief import EDGE, FACE, SHARE, SURE, Surfaces
 from jaxbiped.sensing.view import View
 
 
@@ -145,7 +145,10 @@ def read_relief(surfaces, ground, occupied, solid, params, spec):
     error = np.float32(SURE) * np.float32(params.height_sd) / np.sqrt(many)
     height = ground * np.float32(spec.level_height)
     sd, top = np.zeros(ground.shape, np.float32), np.full(ground.shape, -np.inf, np.float32)
+    beside = max(int(0.05 / spec.pitch + 0.5), 1)
     for i, j in np.ndindex(ground.shape):
+        near = surfaces.weight[:, max(i - beside, 0) : i + beside + 1, max(j - beside, 0) : j + beside + 1]
+        most = near.max((1, 2))
         for level in range(spec.ground_levels):
             if not solid[i, j, level]:
                 continue
@@ -154,7 +157,8 @@ def read_relief(surfaces, ground, occupied, solid, params, spec):
                 continue
             if level == ground[i, j]:
                 height[i, j], sd[i, j] = mean[i, j, level], error[i, j, level]
-            top[i, j] = mean[i, j, level] - error[i, j, level]
+            if surfaces.weight[level, i, j] >= np.float32(SHARE) * most[level]:
+                top[i, j] = mean[i, j, level] - error[i, j, level]
     alone = np.array([np.max(around(top, i, j), initial=-np.inf) for i, j in np.ndindex(top.shape)])
     return height, sd, np.minimum(top, alone.reshape(top.shape))
 
@@ -171,8 +175,9 @@ def solid_levels(voxels, evidence, params, spec):
     """Occupied voxels with enough points in the patch around them, and with such a neighbour."""
     height, width = voxels.shape[:2]
     patch = patch_sum(evidence, spec)
-    dense = (voxels & (patch >= params.solid_points))[..., -spec.lowest :]
-    dense[..., 0] |= (voxels & (patch >= params.solid_points))[..., : 1 - spec.lowest].any(-1)
+    enough = voxels & (patch >= params.solid_points) & (patch >= params.voxel_share * leaking(patch, spec))
+    dense = enough[..., -spec.lowest :].copy()
+    dense[..., 0] |= enough[..., : 1 - spec.lowest].any(-1)
     if params.below_points is not None:
         enough = voxels & (patch >= params.below_points)
         through = enough[..., -spec.lowest :].copy()
@@ -187,6 +192,16 @@ def solid_levels(voxels, evidence, params, spec):
         for k in range(3)
     )
     return dense & (around > 1)  # itself and another
+
+
+def leaking(patch, spec):
+    """The greatest of the voxels one level higher or lower, in each column within 5 cm."""
+    most = np.zeros_like(patch)
+    reach = max(int(0.05 / spec.pitch + 0.5), 1)
+    for i, j, k in np.ndindex(patch.shape):
+        near = patch[max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1]
+        most[i, j, k] = max(near[..., n].max() for n in (k - 1, k + 1) if 0 <= n < patch.shape[2])
+    return most
 
 
 def ground_level(occupied, evidence, spec):
