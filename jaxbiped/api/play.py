@@ -7,8 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import jax
-
 from jaxbiped.api.register import named
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.scene import SceneConfig, load_scene, to_arena, to_terrain
@@ -17,8 +15,7 @@ from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission, Played
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.planning.planners import Planner
-from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.runner import check_mission, play_one, seeing
+from jaxbiped.study.runner import check_mission, noise_of, play_one, seeing
 
 
 @dataclass(frozen=True)
@@ -105,5 +102,5 @@ def play(
     chosen = find_strategy(strategy) if isinstance(strategy, str) else named(strategy)
     check_mission(config)
     with seeing(config) as eyes:
-        played = play_one(arena, config, chosen, from_key(jax.random.key(seed)), on_decision, eyes)
+        played = play_one(arena, config, chosen, noise_of(seed), on_decision, eyes)
     return PlayedMission(name, chosen.name, played)

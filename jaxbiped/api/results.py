@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,12 @@ import pydantic
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
+from jaxbiped.mission.metric import MetricFormat, format_of
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.study import store
 from jaxbiped.study.comparison import Comparison, compare, default_pairs
 from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.groups import metrics_of
 from jaxbiped.study.names import MEASURES
 from jaxbiped.study.schema import metric_columns, ordered, validate
 
@@ -76,13 +78,18 @@ class Results:
     config: dict[str, Any]  # of the study, as it is stored
     folder: Path | None = None  # where it is stored
     own: tuple[Strategy, ...] = ()  # strategies that are not built in
+    shown: Mapping[str, MetricFormat] = field(default_factory=dict)  # how numbers of metrics are shown
 
     @classmethod
     def of(cls, rows: pl.DataFrame, points: pl.DataFrame, config: StudyConfig, own: Sequence[Strategy]) -> Results:
         """Of rows in any order."""
         rank = pl.col("strategy").cast(pl.Enum(ordered(rows["strategy"].unique())))
         return cls(
-            validate(rows).sort("point", "arena", rank), points, config.model_dump(mode="json"), None, tuple(own)
+            rows=validate(rows).sort("point", "arena", rank),
+            points=points,
+            config=config.model_dump(mode="json"),
+            own=tuple(own),
+            shown={name: format_of(metric, name) for name, metric in metrics_of(config).items()},
         )
 
     @property
@@ -115,7 +122,7 @@ class Results:
             raise InputError("must be two strategies, or none for all usual pairs", field="first, second")
         pairs = [(first, second)] if first else default_pairs(self.strategies)
         rows = self.rows.filter(pl.col("strategy").is_in([first, second])) if first else self.rows
-        found = compare(rows, point=point, pairs=pairs, seed=self.config["seed"], resamples=resamples)
+        found = compare(rows, point=point, pairs=pairs, seed=self.config["seed"], resamples=resamples, shown=self.shown)
 
         def shown():
             from jaxbiped.report.tables import terminal
@@ -165,7 +172,7 @@ class Results:
             )
         from jaxbiped.report.own_metric import own_metric
 
-        return own_metric(self.rows, self.points, metric)
+        return own_metric(self.rows, self.points, metric, shown=self.shown)
 
     def save(self, folder: str | Path) -> Path:
         """Store the rows in a new folder, as a study stores them; `jaxbiped report FOLDER` draws its page.
@@ -175,7 +182,7 @@ class Results:
         """
         config, swept = Kept.model_validate(self.config), self.points if self.axes else None
         with store.create(
-            folder, config, seed=self.config["seed"], arenas=self.config["arenas"], points=swept
+            folder, config, seed=self.config["seed"], arenas=self.config["arenas"], points=swept, metrics=self.shown
         ) as results:
             numbered = self.rows.with_columns(
                 (pl.col("arena") // self.config["shard"]).alias("_block")

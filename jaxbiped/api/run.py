@@ -80,4 +80,6 @@ def load(folder: str | Path, own: Sequence[Strategy | Planner] = ()) -> Results:
       InputError: no results folder, or a damaged one.
     """
     frame, manifest = store.read(folder)
-    return Results(frame, store.read_points(folder), manifest.config, Path(folder), tuple(map(named, own)))
+    return Results(
+        frame, store.read_points(folder), manifest.config, Path(folder), tuple(map(named, own)), manifest.metrics
+    )

@@ -50,5 +50,7 @@ def as_stored(results: Results | str | Path) -> Stored:
         return open_stored(results)
     from jaxbiped.study.manifest import Manifest
 
-    manifest = Manifest.model_construct(config=results.config, seed=results.config["seed"], state="finished")
+    manifest = Manifest.model_construct(
+        config=results.config, seed=results.config["seed"], state="finished", metrics=results.shown
+    )
     return Stored(results.folder or Path("results"), results.rows, manifest, results.points)

@@ -7,8 +7,6 @@ import math
 import sys
 from pathlib import Path
 
-import jax
-
 from jaxbiped.arenas import load_scene, scene_warnings
 from jaxbiped.commands.options.run import RunArgs
 from jaxbiped.config import config_hash
@@ -20,8 +18,7 @@ from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.report.animation import save_gif
 from jaxbiped.report.pictures import save_mission
-from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.runner import check_mission, play_one, program_of, seeing
+from jaxbiped.study.runner import check_mission, noise_of, play_one, program_of, seeing
 
 NOT_REACHED = 1  # exit status
 
@@ -54,7 +51,7 @@ def main(args: RunArgs) -> int:
             arena,
             args.mission,
             strategy,
-            from_key(jax.random.key(args.seed)),
+            noise_of(args.seed),
             lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
             eyes,
         )

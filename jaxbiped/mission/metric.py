@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pydantic
 from jaxtyping import Array, Bool, Float
 
+from jaxbiped.config import Model, parse
 from jaxbiped.core.component import as_component
 from jaxbiped.core.registry import METRICS
 from jaxbiped.errors import InputError
@@ -40,6 +42,18 @@ class MissionEnd:
     result: Any  # `Result`: its code, distance, time and so on
     plan: Any  # `OraclePlan`: whether a plan exists with perfect knowledge, its cost and its length
     settings: Any  # `Settings`
+
+
+class MetricFormat(Model):
+    """How a metric's numbers are shown, as it is stored with them: who reads them may not have the metric."""
+
+    unit: Annotated[str, pydantic.Field(max_length=40, pattern=r"^[^$\x00-\x1f]*$")] = ""
+    """without `$`, by which formulas would begin in figures"""
+    scale: Annotated[float, pydantic.Field(allow_inf_nan=False)] = 1.0
+    """from SI to that unit"""
+    digits: Annotated[int, pydantic.Field(ge=0, le=12)] = 2
+    """after the point"""
+    smaller_is_better: bool = True
 
 
 class Metric:
@@ -77,6 +91,17 @@ def as_metric(thing: object, name: str) -> Metric:
         message = "must begin with a small letter and have at most 40 small letters, digits and _"
         raise InputError(message, field="name of a metric", value=name)
     return as_component(thing, Metric, f"metric {name}")
+
+
+def format_of(metric: Metric, name: str) -> MetricFormat:
+    """How the numbers of a metric are shown.
+
+    Raises:
+      InputError: a unit, scale or number of digits that is none.
+    """
+    return parse(
+        MetricFormat, {field: getattr(metric, field) for field in MetricFormat.model_fields}, file=f"metric {name}"
+    )
 
 
 def find_metric(name: str) -> Metric:

@@ -53,6 +53,11 @@ class HostPlanner(Planner):
     limit: float = field(default=10.0, metadata={"static": True})  # [s] for one plan
     number: Any = field(default=None, repr=False, compare=False, metadata={"derived": True})
 
+    def __init_subclass__(cls, **kwargs):
+        raise TypeError(
+            f"{cls.__name__} cannot extend HostPlanner: give HostPlanner another function, or extend Planner"
+        )
+
     def __post_init__(self):
         if not callable(self.function):
             raise InputError("must be a function", field="HostPlanner", value=self.function)

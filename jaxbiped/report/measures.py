@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
+from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.study import Comparison
 
 
@@ -31,18 +34,19 @@ TIME = Measure("time", "min", 1 / 60, 2, "more", "less", True)
 MEASURES = (SUCCESS, DISTANCE, TIME)
 
 
-def metric_measure(name: str) -> Measure:
-    """How the metric of a column is said: as it says itself, where it is registered here. Nothing is imported: of one
-    that is not, numbers are shown as they are, and which are better is not said."""
+def metric_measure(name: str, shown: Mapping[str, MetricFormat] = MappingProxyType({})) -> Measure:
+    """How the metric of a column is said: as was stored with its numbers, else as it says itself where it is registered
+    here. Nothing is imported: of one that is neither, numbers are shown as they are, and which are better is not said.
+    """
     from jaxbiped.core.registry import METRICS
     from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
 
-    if name not in METRICS:
+    if name not in shown and name not in METRICS:
         return Measure(name, "", 1.0, 3, "more", "less", None)
-    metric = METRICS.held[name]
+    metric = shown[name] if name in shown else METRICS.held[name]
     return Measure(name, metric.unit, metric.scale, metric.digits, "more", "less", metric.smaller_is_better)
 
 
 def metric_measures(comparison: Comparison) -> tuple[Measure, ...]:
     """Those that a comparison has beside success, distance and time."""
-    return tuple(map(metric_measure, comparison.metrics))
+    return tuple(metric_measure(name, comparison.shown) for name in comparison.metrics)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
+from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.report.answer import MEASURES
 from jaxbiped.report.figures import canvas, error_bars, legend_above, look
 from jaxbiped.report.measures import metric_measure
@@ -30,14 +33,21 @@ def own_estimate(rows: pl.DataFrame, metric: str, seed: int = 0) -> Estimate:
 
 
 @own_style()
-def own_metric(rows: pl.DataFrame, points: pl.DataFrame, metric: str, size: tuple[float, float] = (6.4, 4.0)) -> Figure:
+def own_metric(
+    rows: pl.DataFrame,
+    points: pl.DataFrame,
+    metric: str,
+    size: tuple[float, float] = (6.4, 4.0),
+    shown: Mapping[str, MetricFormat] = MappingProxyType({}),
+) -> Figure:
     """The figure.
 
     Args:
       points: as `store.read_points` gives them, with one swept field at most.
       size: [inch] width and height.
+      shown: how numbers of metrics are shown, as a manifest says.
     """
-    measure = next((item for item in MEASURES if item.name == metric), None) or metric_measure(metric)
+    measure = next((item for item in MEASURES if item.name == metric), None) or metric_measure(metric, shown)
     strategies, fields = ordered(rows["strategy"].unique()), [name for name in points.columns if name != "point"]
     figure, ax = canvas(*size)
     places = points[fields[0]].to_numpy() if fields else np.zeros(1)

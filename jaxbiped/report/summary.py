@@ -68,7 +68,7 @@ def write_comparison_report(folder: str | Path, *, point: int = 0, resamples: in
     frame, manifest = read(folder)
     if frame.is_empty():
         raise InputError("has no rows to report on yet", file=folder)
-    comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
+    comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples, shown=manifest.metrics)
     figures = write_figures(folder, frame, comparison)
     frame = frame.filter(pl.col("point") == point)
     remarks = () if manifest.state == "finished" else (unfinished(comparison, manifest),)

@@ -51,7 +51,7 @@ def write_sweep_page(
         raise InputError(allowed, file=folder, field="point", value=point)
     rows = read(folder).rows
     frame = rows.filter(pl.col("point") == point)
-    comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples)
+    comparison = compare(frame, point=point, seed=manifest.seed, resamples=resamples, shown=manifest.metrics)
     page = page_of(
         frame,
         comparison,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import polars as pl
 from jaxtyping import Float
 
 from jaxbiped.errors import InputError
+from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.study.intervals import NOTHING, Estimate, mean_and_median, proportion
 from jaxbiped.study.metric_pairs import corrected_metrics, metric_means, metric_pairs
 from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
@@ -74,6 +75,7 @@ class Comparison:
     strategies: tuple[str, ...]
     summaries: tuple[StrategySummary, ...]
     pairs: tuple[PairComparison, ...]
+    shown: Mapping[str, MetricFormat] = field(default_factory=dict)  # how columns of metrics are shown, where known
 
     @property
     def metrics(self) -> tuple[str, ...]:
@@ -115,6 +117,7 @@ def compare(
     seed: int = 0,
     resamples: int = 4999,
     level: float = 0.95,
+    shown: Mapping[str, MetricFormat] | None = None,
 ) -> Comparison:
     """Compare the strategies of one sweep point; see `compare_named`.
 
@@ -122,6 +125,7 @@ def compare(
       frame: rows of `schema.SCHEMA`.
       pairs: (first, second) to compare; by default `default_pairs`.
       seed: of the bootstraps; each one gets its own stream from it.
+      shown: how numbers of metrics are shown, as a manifest says.
     """
     frame = validate(frame).filter(pl.col("point") == point).sort("arena")
     if frame.is_empty():
@@ -131,7 +135,9 @@ def compare(
     pairs = default_pairs(strategies) if pairs is None else tuple(pairs)
     for name in {name for pair in pairs for name in pair} - present:
         raise InputError(f"must be one of {', '.join(strategies)}", field="pairs", value=name)
-    return compare_named(frame, strategies, pairs, point=point, seed=seed, resamples=resamples, level=level)
+    return compare_named(
+        frame, strategies, pairs, point=point, seed=seed, resamples=resamples, level=level, shown=shown
+    )
 
 
 def compare_named(
@@ -143,6 +149,7 @@ def compare_named(
     seed: int = 0,
     resamples: int = 4999,
     level: float = 0.95,
+    shown: Mapping[str, MetricFormat] | None = None,
 ) -> Comparison:
     """Compare whatever the column `strategy` names, arena by arena.
 
@@ -170,7 +177,14 @@ def compare_named(
                 pair = replace(pair, metrics=metric_pairs(by_name[first], by_name[second], others, **options))
             compared.append(pair)
     return Comparison(
-        point, level, seed, resamples, strategies, tuple(summaries), corrected_metrics(corrected(compared))
+        point=point,
+        level=level,
+        seed=seed,
+        resamples=resamples,
+        strategies=strategies,
+        summaries=tuple(summaries),
+        pairs=corrected_metrics(corrected(compared)),
+        shown=shown or {},
     )
 
 

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import polars as pl
 
+from jaxbiped.mission.metric import format_of
 from jaxbiped.study import store
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress, evaluate
-from jaxbiped.study.groups import Point, Shard, groups_of, only_point, shards
+from jaxbiped.study.groups import Point, Shard, groups_of, metrics_of, only_point, shards
 from jaxbiped.study.resume import resume as take_up
 
 # Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.
@@ -55,6 +56,7 @@ def conduct(
     groups = groups_of(config, points)  # refuses what does not go together before anything is written
     kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
     kind["device_name"] = device
+    kind["metrics"] = {name: format_of(metric, name) for name, metric in metrics_of(config).items()}
     if resume:
         results = take_up(folder, config, rows=shard_rows(config, points, swept=swept), **kind)
     else:

@@ -15,6 +15,7 @@ import pydantic
 from jaxbiped import __version__
 from jaxbiped.config import Model, parse
 from jaxbiped.errors import InputError
+from jaxbiped.mission.metric import MetricFormat
 
 FORMAT = 1
 MANIFEST = "manifest.json"
@@ -48,6 +49,8 @@ class Manifest(Model):
     shards: int | None = None
     rows: int | None = None
     """Rows in all shards, once finished."""
+    metrics: dict[str, MetricFormat] = pydantic.Field(default_factory=dict)
+    """How the numbers in the columns of metrics are shown."""
 
 
 def versions() -> dict[str, str]:

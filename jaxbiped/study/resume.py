@@ -11,6 +11,7 @@ import polars as pl
 from jaxbiped import files
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
+from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
 from jaxbiped.study.schema import validate
@@ -29,12 +30,13 @@ def resume(
     rows: Sequence[int],
     points: pl.DataFrame | None = None,
     device_name: str = "",
+    metrics: Mapping[str, MetricFormat] | None = None,
 ) -> Store:
     """A results folder open for writing what is left; where nothing was begun there, a new one.
 
     Args:
       rows: how many rows each shard has, by its number.
-      points: of a sweep, as for `create`.
+      points, metrics: as for `create`.
       device_name: of where it will be computed; by default the devices that JAX sees here.
 
     Raises:
@@ -43,7 +45,8 @@ def resume(
     """
     folder = Path(folder)
     if not begun(folder):
-        return create(folder, config, seed=seed, arenas=arenas, points=points, device_name=device_name)
+        made = {"points": points, "device_name": device_name, "metrics": metrics}
+        return create(folder, config, seed=seed, arenas=arenas, **made)
     manifest = read_manifest(folder)
     refuse_finished(folder, manifest)
     refuse_other_config(folder, manifest, config)

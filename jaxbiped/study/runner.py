@@ -7,22 +7,37 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
+import jax
+import numpy as np
 from jaxtyping import Array, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.component import traced_component, with_numbers
+from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.mission.eyes import Eyes, eyes_for
 from jaxbiped.mission.program_for import program_for
 from jaxbiped.mission.queue import Result
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.stepped import Mission, Played, run_logged
 from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.groups import Group, numbers_under
+
+
+def noise_of(seed: int) -> UInt32[Array, ""]:
+    """The seed of all noise of one mission, from that which a user gives."""
+    return noise_of_word(np.uint32(seed & 0xFFFFFFFF))
+
+
+@ready_jit
+def noise_of_word(seed: UInt32[Array, ""]) -> UInt32[Array, ""]:
+    """One program, where JAX by itself loads six small ones."""
+    return from_key(jax.random.key(seed))
 
 
 def program_of(config: MissionConfig, arena: Arena) -> Program:
     """The static part of missions in one arena; see `mission.program_for`."""
-    return program_for(config, tuple(round(float(side), 6) for side in arena.size_xy), arena.terrain)
+    return program_for(config, tuple(round(float(side), 6) for side in np.asarray(arena.size_xy)), arena.terrain)
 
 
 def check_mission(config: MissionConfig) -> None:

@@ -172,5 +172,6 @@ def compare_sides(
     frame = side_by_side(first, second)
     names = (first.name, second.name)
     seed = first.stored.manifest.seed if seed is None else seed
-    options = {"seed": seed, "resamples": resamples, "level": level}
+    shown = second.stored.manifest.metrics | first.stored.manifest.metrics
+    options = {"shown": shown, "seed": seed, "resamples": resamples, "level": level}
     return compare_named(frame, names, [names], point=first.point, **options), frame

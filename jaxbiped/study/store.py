@@ -14,6 +14,7 @@ import contextlib
 import io
 import re
 import time
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,6 +24,7 @@ import polars as pl
 from jaxbiped.config import Model, config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
+from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
 from jaxbiped.study.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
@@ -128,6 +130,7 @@ def create(
     points: pl.DataFrame | None = None,
     command: str | None = None,
     device_name: str = "",
+    metrics: Mapping[str, MetricFormat] | None = None,
 ) -> Store:
     """Start a results folder: take its lock, write its sweep points and its manifest.
 
@@ -137,6 +140,7 @@ def create(
       points: of a sweep: `point`, and a column for each field.
       command: the command line; by default this process's.
       device_name: by default the devices that JAX sees.
+      metrics: how the numbers of columns that not all studies have are shown.
     """
     folder = Path(folder)
     refuse_filled(folder)
@@ -149,6 +153,7 @@ def create(
         device=device_name or device(),
         seed=seed,
         arenas=arenas,
+        metrics=dict(metrics or {}),
         started=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     made = not folder.exists()

@@ -12,6 +12,9 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.arenas import sample
+from jaxbiped.core.registry import METRICS
+from jaxbiped.mission.metric import format_of
+from jaxbiped.report.measures import metric_measure
 from jaxbiped.study.schema import FAMILIES
 from tests.api.conftest import EXAMPLES
 
@@ -111,6 +114,27 @@ def test_they_are_part_of_the_config_and_drawn_like_any_other(swept, tmp_path):
     swept.save(tmp_path / "kept")
     again = jb.load(tmp_path / "kept")
     assert again.rows.equals(swept.rows)
+
+
+def test_their_units_are_stored_with_their_numbers(swept, tmp_path, monkeypatch):
+    """So that who has the rows and not the metric reads the same tables and figures."""
+    swept.save(tmp_path / "kept")
+    monkeypatch.delitem(METRICS.held, "turned_angle")
+    again = jb.load(tmp_path / "kept")
+    assert again.shown["turned_angle"].model_dump() == {
+        "unit": "rad", "scale": 1.0, "digits": 2, "smaller_is_better": True,
+    }  # fmt: skip
+    only = replace(again, rows=point(again, 0), points=again.points.head(1).select("point"))
+    assert "turned_angle [rad]" in only.plot("turned_angle").axes[0].get_ylabel()
+    assert metric_measure("turned_angle", only.compare().statistics.shown).title == "turned_angle, rad"
+
+
+@pytest.mark.parametrize("wrong", [{"unit": "$x$"}, {"unit": 3}, {"scale": float("nan")}, {"digits": -1}])
+def test_a_metric_that_cannot_be_shown_is_refused(wrong):
+    metric = type("Odd", (TurnedAngle,), wrong)()
+    with pytest.raises(jb.InputError, match=f"metric odd: {next(iter(wrong))}: ") as error:
+        format_of(metric, "odd")
+    assert "\n" not in str(error.value)
 
 
 def test_a_number_that_no_component_has_is_named():

@@ -15,8 +15,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.mission.stepped import Mission, Recorder, turn_once
-from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.runner import play_one
+from jaxbiped.study.runner import noise_of, play_one
 
 
 def load_scenes(folder: Path, names: tuple[str, ...]) -> dict[str, Arena]:
@@ -33,7 +32,7 @@ def load_scenes(folder: Path, names: tuple[str, ...]) -> dict[str, Arena]:
 
 def play(arena: Arena, config: MissionConfig, strategy: str, seed: int, eyes: Eyes | None = None) -> Mission:
     """One mission, with its log. Consumes `jax.random.key(seed)`."""
-    return play_one(arena, config, strategy, from_key(jax.random.key(seed)), eyes=eyes)
+    return play_one(arena, config, strategy, noise_of(seed), eyes=eyes)
 
 
 def play_changing(
@@ -46,7 +45,7 @@ def play_changing(
     """
     arena, settings = arena_at(0), config.settings(strategy)
     static = program(config, tuple(round(float(v), 6) for v in arena.size_xy))
-    noise = from_key(jax.random.key(seed))
+    noise = noise_of(seed)
     world, mind = jax.tree.map(lambda leaf: leaf[None], start(arena, settings, noise, static.spec))
     points = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], settings)
     recorder = Recorder(settings, static, lambda _: None, eyes)
