@@ -22,6 +22,7 @@ from jaxbiped.mission.strategies import STRATEGIES, Strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.groups import check_numbers, strategies_of
 from jaxbiped.study.names import METRICS
 from jaxbiped.study.schema import FAMILIES
 from jaxbiped.study.schema import STRATEGIES as BUILT_IN
@@ -98,7 +99,8 @@ class Study:
         if isinstance(self.metrics, str | Metric | type):
             raise InputError("must be a list", field="metrics", value=self.metrics)
         object.__setattr__(self, "own", tuple(named(item) for item in self.strategies if not isinstance(item, str)))
-        self.config()
+        config = self.config()
+        check_numbers(config.numbers, config.mission, strategies_of(config))
 
     def config(self, axes: Mapping[str, Sequence[float | int]] | None = None) -> StudyConfig:
         """The config that a command line would have; its strategies are registered.

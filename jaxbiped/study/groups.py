@@ -143,7 +143,7 @@ def group_points(
     strategies = [find_strategy(item) if isinstance(item, str) else item for item in strategies]
     points = tuple(replace(point, own={**(numbers or {}), **point.own}) for point in points)
     for point in points:
-        check_numbers(point, strategies)
+        check_numbers(point.own, point.mission, strategies)
     together: dict[tuple, list[Point]] = {}
     for place, point in itertools.product(range(len(kinds)), points):
         simulated = point.mission.executor in SIMULATED
@@ -161,15 +161,14 @@ def group_points(
     )
 
 
-def check_numbers(point: Point, strategies: Sequence[Strategy]) -> None:
-    """Raise `InputError` about a number of a point that no component of its missions has."""
-    mission = point.mission
+def check_numbers(own: Iterable[str], mission: MissionConfig, strategies: Sequence[Strategy]) -> None:
+    """Raise `InputError` about a number (`planner.clearance`) that no component of the missions has."""
     there = {
         "planner": sorted({name for item in strategies for name in numbers_of(item.planner)}),
         "sensor": list(numbers_of(find_sensor(mission.sensor))),
         "executor": list(numbers_of(find_executor(mission.executor))),
     }
-    for dotted in point.own:
+    for dotted in own:
         kind, _, name = dotted.partition(".")
         if name not in there.get(kind, ()):
             known = f"has {', '.join(there[kind])}" if there.get(kind) else "has none"

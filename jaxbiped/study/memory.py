@@ -6,6 +6,7 @@ import contextlib
 import os
 from pathlib import Path
 
+from jaxbiped.core.sizes import JOBS, POINTS, filled
 from jaxbiped.errors import InputError
 from jaxbiped.mission.queue import SLOTS
 from jaxbiped.mission.settings import Program
@@ -42,16 +43,23 @@ def check_memory(static: Program, points: int, strategies: int, arenas: int, wor
     """Raise `InputError` when a shard of `arenas` under `points` does not fit, with what would.
 
     Args:
-      points: of one group, all in one call.
+      points: of one group, all in one call; memory is taken for as many as their program is compiled for.
       workers: queues at once, each with maps of its own.
     """
-    maps = map_bytes(static, workers)
-    left = memory() - maps - points * (POINT + strategies * SETTING)
-    fit = left // (points * strategies * ROW)
-    if left <= 0 or fit < 1:
+    kinds, maps = points * strategies, map_bytes(static, workers)
+    left = memory() - maps - points * POINT - filled(kinds, POINTS) * SETTING
+    fit = jobs_that_fit(left, workers) // kinds
+    if fit < 1:
         size = f"{points} points x {strategies} strategies with maps of {static.spec.shape} cells"
-        message = f"{size} need {(memory() - left) / 2**30:.1f} GiB, of {memory() / 2**30:.1f} that may be used"
+        least = memory() - left + workers * filled(-(-kinds // workers), JOBS) * ROW
+        message = f"{size} need {least / 2**30:.1f} GiB, of {memory() / 2**30:.1f} that may be used"
         raise InputError(f"{message}; sweep fewer points at once, or on a coarser pitch", field="axes")
     if arenas > fit:
         message = f"{points} points x {strategies} strategies: at most {fit} arenas a shard fit in memory"
         raise InputError(message, field="shard", value=arenas)
+
+
+def jobs_that_fit(left: int, workers: int) -> int:
+    """How many missions fit into so many bytes, in queues as long as programs are compiled for (`core.sizes`)."""
+    length = max(left, 0) // (workers * ROW)
+    return workers * (1 << length.bit_length() - 1) if length >= JOBS else 0

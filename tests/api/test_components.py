@@ -139,6 +139,9 @@ def test_a_metric_that_cannot_be_shown_is_refused(wrong):
 
 def test_a_number_that_no_component_has_is_named():
     study = jb.Study(jb.RandomArenas(count=2), ["full"], sensor=ShortSighted())
+    for name in ("sensor.length", "executor.chance", "planner.clearance"):
+        with pytest.raises(jb.InputError, match="of these missions has this number"):
+            jb.Study(jb.RandomArenas(count=2), ["full"], sensor=ShortSighted(), numbers={name: 1.0})
     with pytest.raises(jb.InputError, match="no sensor of these missions has this number; sensor has reach"):
         jb.sweep(study, {"sensor.length": [1.0]})
     with pytest.raises(jb.InputError, match="no executor of these missions has this number; executor has none"):

@@ -218,3 +218,26 @@ def test_more_points_than_memory_holds_are_refused(monkeypatch):
     monkeypatch.setattr(memory, "memory", lambda: 2**26)
     with pytest.raises(InputError, match=r"need [0-9.]+ GiB, of 0.1 that may be used; sweep fewer points"):
         check_memory(static, 2000, 2, 1024, 2)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3, 64])
+@pytest.mark.parametrize(("points", "strategies"), [(1, 1), (1, 5), (3, 3), (8, 1), (33, 2), (129, 4)])
+def test_what_memory_holds_is_counted_as_programs_are_compiled(points, strategies, workers, monkeypatch):
+    """Queues, and the points of a program, are of powers of two."""
+    static = group_points(sweep(C3).points(), STRATEGIES)[0].static
+
+    def needed(arenas):
+        length, rows = 64, 8
+        while length * workers < arenas * points * strategies:
+            length *= 2
+        while rows < points * strategies:
+            rows *= 2
+        lasting = memory.map_bytes(static, workers) + points * memory.POINT + rows * memory.SETTING
+        return lasting + length * workers * memory.ROW
+
+    for arenas in (1, 7, 64, 1000, 1024, 1025):
+        monkeypatch.setattr(memory, "memory", lambda: needed(arenas))  # noqa: B023
+        check_memory(static, points, strategies, arenas, workers)
+        monkeypatch.setattr(memory, "memory", lambda: needed(arenas) - 1)  # noqa: B023
+        with pytest.raises(InputError, match=r"arenas a shard fit in memory|that may be used"):
+            check_memory(static, points, strategies, arenas, workers)
