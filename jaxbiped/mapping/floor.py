@@ -32,7 +32,7 @@ class Floor:
     up: Float[np.ndarray, "3"]  # unit vector against gravity, in the frame of the cloud
     offset: float  # [m]
     share: float  # of the places that lie on it
-    score: float  # the same less twice the share of places below it
+    score: float  # the same minus twice the share of places below it
     spread: float  # [m] root mean square distance of these from it
 
 
@@ -49,7 +49,7 @@ def find_floor(
     """The floor of a cloud: the plane of greatest area that little lies below; None when there is none.
 
     Points are first made into places, one a cube of side `place`, so that area counts and not density. Planes through
-    three random places whose upward normal lies within `cone` of `up` are scored by the places on them less twice
+    three random places whose upward normal lies within `cone` of `up` are scored by the places on them minus twice
     those below; the best are refined by reweighted least squares (Tukey's biweight), and the best of those wins. It
     must hold 5 % of all places and be no mere strip. Where none does, the cloud may be a noisy one: the next, wider
     tolerance is tried. (The narrowest must be well below half a step: else a slope laid across stairs wins.)
@@ -138,7 +138,7 @@ def draw(places, up, cone: float, rng: np.random.Generator):
 
 
 def score(places, normals, offsets, inlier: float):
-    """Places on each plane less twice those below it [K]."""
+    """Places on each plane minus twice those below it [K]."""
     distance = normals @ places.T - offsets[:, None]
     return (np.abs(distance) < inlier).sum(1) - BELOW_PRICE * (distance < -2 * inlier).sum(1)
 

@@ -152,7 +152,7 @@ class Library:
     """`LibraryConfig`, traced; the first axis is that of `PLAYED`, of `stands` that of `STEPS`."""
 
     request: Float[Array, "*B 6 3"]  # [m, m, rad]
-    bias: Float[Array, "*B 6 3"]  # mean displacement less the request
+    bias: Float[Array, "*B 6 3"]  # mean displacement minus the request
     root: Float[Array, "*B 6 3 3"]  # Cholesky factor of its covariance
     falls: Float[Array, "*B 6"]  # probability
     sway: Float[Array, "*B 6"]  # [m]

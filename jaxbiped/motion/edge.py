@@ -27,7 +27,7 @@ def crossing_direction(
 
     Args:
       ij: the robot's cell; `step_ij` the move (di, dj) to the neighbour on the other level.
-      rise: level of the neighbour less that of the robot's cell.
+      rise: level of the neighbour minus that of the robot's cell.
       pitch: static [m].
 
     Returns:

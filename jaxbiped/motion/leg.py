@@ -65,8 +65,8 @@ def leg_angles(
       hip, ankle: points [m] in one frame; R_pelvis, R_foot: attitudes in that frame.
 
     Returns:
-      The angles, and the slack [m]: length of the straight leg less the distance. Where it is negative the ankle is out
-      of reach and the angles are those of a straight leg that points at it; callers must look at the slack.
+      The angles, and the slack [m]: length of the straight leg minus the distance. Where it is negative the ankle is
+      out of reach and the angles are those of a straight leg that points at it; callers must look at the slack.
     """
     x, y, z = R_foot.T @ (hip - ankle)
     upright = jnp.hypot(y, z)

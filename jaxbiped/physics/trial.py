@@ -53,7 +53,7 @@ class Tolerance(Model):
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the robot ended; error in the frame of the start, actual less requested."""
+    """Where the robot ended; error in the frame of the start, actual minus requested."""
 
     error: np.ndarray  # [3] (x, y) [m] and yaw [rad] of the middle between the feet
     height: float  # [m] greatest distance of a sole from its ground

@@ -44,7 +44,7 @@ EVERY = 2  # steps between two looks at the zero moment point
 
 @dataclass(frozen=True)
 class Trials:
-    """What came of each trial, [B]. Errors are in the frame of the start, actual less requested.
+    """What came of each trial, [B]. Errors are in the frame of the start, actual minus requested.
 
     What needs records of every step is NaN where they were not asked for.
     """

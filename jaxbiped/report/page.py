@@ -94,7 +94,7 @@ def keys(comparison: Comparison) -> tuple[Key, ...]:
         if value.low is not None:
             low, high = (typeset(signed(limit * measure.scale, measure.digits)) for limit in (value.low, value.high))
             limits = f"{low} to {high}, on {value.n:,} arenas"
-        name = f"{measure.name}, {first} less {second}"
+        name = f"{measure.name}, {first} minus {second}"
         amount = typeset(signed(value.estimate * measure.scale, measure.digits))
         found.append(Key(name, f"{amount} {measure.unit}", limits, verdict(pair, measure) != OPEN))
     return tuple(found)

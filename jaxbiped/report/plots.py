@@ -51,7 +51,7 @@ def plots(frame: pl.DataFrame, comparison: Comparison) -> dict[str, list[Plot]]:
             first, second = comparison.question
             for measure in (*MEASURES, *metric_measures(comparison)):
                 caption = (
-                    f"Difference in {measure.name}, {first} less {second}, with its interval. Filled: shown after "
+                    f"Difference in {measure.name}, {first} minus {second}, with its interval. Filled: shown after "
                 )
                 caption += "Holm’s correction. Cross: too few arenas, or too equal, for an interval."
                 add("strata", f"forest-{measure.name}", forest(comparison, first, second, measure), caption)

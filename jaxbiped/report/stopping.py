@@ -24,7 +24,7 @@ def stopping_sentences(folder: str | Path) -> tuple[str, ...]:
     limits = [signed(value * measure.scale, measure.digits) for value in (found.low, found.high)]
     wide = f"{(found.high - found.low) * measure.scale:.{measure.digits}f} wide"
     what = (
-        f"the difference in {measure.name}, {found.first} less {found.second}, is {' to '.join(limits)} {measure.unit}"
+        f"the difference in {measure.name}, {found.first} minus {found.second}, is {' to '.join(limits)} {measure.unit}"
     )
     left = f" {found.most - found.arenas:,} arenas were left out." if found.arenas < found.most else ""
     sure = f"This interval holds at all looks at once with {100 * found.level:g} % (confidence sequence, on"

@@ -105,11 +105,11 @@ def sheets(result: SweepResult) -> tuple[Sheet, ...]:
         first, second = result.question
         columns = {titled(m): lambda point, m=m: difference(point.pair, m) for m in MEASURES}
         note = "Distance and time where both arrived."
-        made.append(sheet(f"{first} less {second} on the same arenas", result, columns, (level, note)))
+        made.append(sheet(f"{first} minus {second} on the same arenas", result, columns, (level, note)))
     if result.reference is not None and len(result.points) > 1:
         for name in result.strategies:
             columns = {titled(m): lambda point, m=m, name=name: difference(point.change.get(name), m) for m in MEASURES}
-            title = f"{name}: each point less point {result.reference}, the config's own values"
+            title = f"{name}: each point minus point {result.reference}, the config's own values"
             made.append(sheet(title, result, columns, (level,)))
     return tuple(made)
 

@@ -64,7 +64,7 @@ def difference_panels(result: SweepResult, measures: Sequence[Measure] = MEASURE
     first, second = result.question
     return [
         Difference(
-            f"{first} less {second}:\n{m.name} [{m.unit}]",
+            f"{first} minus {second}:\n{m.name} [{m.unit}]",
             m.scale,
             m.digits,
             True,

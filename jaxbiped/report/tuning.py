@@ -47,7 +47,7 @@ def gaps_sheet(tuning: Tuning) -> Sheet:
     """The differences on the test arenas."""
     rows = []
     for gap in tuning.gaps:
-        cells = (f"{gap.first} less {gap.second}", estimate(gap.objective), estimate(gap.success, 100.0))
+        cells = (f"{gap.first} minus {gap.second}", estimate(gap.objective), estimate(gap.success, 100.0))
         rows.append((*cells, estimate(gap.time.mean)))
     both = sorted(gap.time.n for gap in tuning.gaps)
     return Sheet(
@@ -155,7 +155,7 @@ def draw_gaps(ax: Axes, gaps: tuple[Gap, ...]) -> None:
             ax.plot([value.low, value.high], [y, y], color=colour, lw=2, solid_capstyle="butt")
         ax.plot(value.estimate, y, "D", color=colour, mfc=colour if shown else "white", ms=6)
         ax.annotate(
-            f"{gap.first} less {gap.second}", (0.0, y), (0, 9), textcoords="offset points",
+            f"{gap.first} minus {gap.second}", (0.0, y), (0, 9), textcoords="offset points",
             xycoords=("axes fraction", "data"), fontsize=8, color=INK,
         )  # fmt: skip
         ax.axhline(y, color=GRID, lw=0.5, zorder=0)

@@ -22,7 +22,7 @@ class PointResult:
     values: dict[str, float]  # field: value
     success: dict[str, Estimate]  # by strategy
     pair: PairComparison | None  # the two strategies of the question on the same arenas; None with fewer
-    change: dict[str, PairComparison]  # by strategy: this point less the reference, on the same arenas
+    change: dict[str, PairComparison]  # by strategy: this point minus the reference, on the same arenas
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ Play = Callable[[np.ndarray, np.ndarray, OnProgress], Result]
 
 @dataclass(frozen=True)
 class Gap:
-    """Two sets of costs on the test arenas. Differences are first less second."""
+    """Two sets of costs on the test arenas. Differences are first minus second."""
 
     first: str
     second: str

@@ -46,7 +46,7 @@ def test_tunes_writes_and_the_costs_can_be_used(here, small, capsys):
     """And the missions behind it: they do not depend on what they are played with."""
     assert cli.main(["tune", *TINY, "--out", "mine"]) == 0
     said = capsys.readouterr().out
-    assert "tuned less start" in said and "written mine: costs.toml" in said
+    assert "tuned minus start" in said and "written mine: costs.toml" in said
     files = {"costs.toml", "history.parquet", "manifest.json", "summary.md", "sweep.parquet", "test.parquet"}
     assert {path.name for path in (here / "mine").iterdir()} == files | {"tune.png"}
     test = pl.read_parquet(here / "mine" / "test.parquet")

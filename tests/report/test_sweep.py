@@ -76,7 +76,7 @@ def test_summary_says_what_the_rows_hold(tmp_path):
         reached = frame.filter((pl.col("point") == point.index) & (pl.col("strategy") == PAIR[0]))["success"].mean()
         line = next(row for row in text.splitlines() if row.startswith(f"| {point.index} |"))
         assert f"{100 * reached:.1f} [" in line
-    assert "bump_aware: each point less point 2" in text
+    assert "bump_aware: each point minus point 2" in text
     ended = text.split("### How missions ended")[1].split("###")[0].split("## ")[0]
     names, *table_rows = ([cell.strip() for cell in row.split("|")[1:-1]] for row in ended.splitlines() if "|" in row)
     for row in table_rows[1:]:  # under the line that aligns columns

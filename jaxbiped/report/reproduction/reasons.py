@@ -66,7 +66,7 @@ def time_reason(item: Experiment, record: Record, measure: float, gate_depth: fl
 
 
 def parts_beyond(item: Experiment, record: Record, measure: float) -> list[tuple[float, str]]:
-    """Each kind of action less what Table 2 has for it: [s], and its name."""
+    """Each kind of action minus what Table 2 has for it: [s], and its name."""
     table, parts = expected(item, measure), record.parts
     floor, edges = parts[STRAIGHT] + parts[OBLIQUE], parts[UP] + parts[DOWN]
     walked = f"{100 * floor.metres:.0f} cm, {parts[OBLIQUE].count} of {floor.count} moves oblique"

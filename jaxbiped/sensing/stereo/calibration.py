@@ -34,7 +34,7 @@ class StereoCamera:
     centre: tuple[float, float]  # [px] principal point (u, v) of the left image
     baseline: float  # [m]
     size: tuple[int, int]  # [px] (width, height)
-    doffs: float = 0.0  # [px] column of the right principal point less that of the left; 0 for parallel cameras
+    doffs: float = 0.0  # [px] column of the right principal point minus that of the left; 0 for parallel cameras
 
     def __post_init__(self):
         for name, least in (("focal", LEAST), ("baseline", LEAST), ("centre", -np.inf), ("doffs", -np.inf)):
@@ -85,7 +85,7 @@ class RectifiedConfig(Model):
     baseline: Baseline
     """[m]"""
     doffs: float = 0.0
-    """[px] column of the right principal point less that of the left."""
+    """[px] column of the right principal point minus that of the left."""
     num_disparities: int | None = Field(None, ge=16, le=2048, multiple_of=16)
     """[px] search range that suits the scene."""
     pose: PoseConfig | None = None
