@@ -26,10 +26,10 @@ from jaxbiped.mapping.chart import ONE_LOOK, make_chart
 from jaxbiped.mapping.floor import find_floor
 from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.sensing.camera import CameraConfig, mount, placed
-from jaxbiped.sensing.stereo import MatchParams, ideal, match, to_points
-from jaxbiped.sensing.stereo.matching import grey, search
-from jaxbiped.sensing.stereo.points import useful_range
-from jaxbiped.sensing.stereo.renderer import Renderer
+from jaxbiped.stereo import MatchParams, ideal, match, to_points
+from jaxbiped.stereo.matching import grey, search
+from jaxbiped.stereo.points import useful_range
+from jaxbiped.stereo.renderer import Renderer
 
 TILT = 0.6  # [deg] standard deviation of roll and pitch that nobody knows
 

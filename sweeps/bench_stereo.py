@@ -30,8 +30,8 @@ from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.sensing.localisation import Belief, correct
 from jaxbiped.sensing.presets import RayConfig
-from jaxbiped.sensing.stereo import landmarks, matching
-from jaxbiped.sensing.stereo.fit import quality, together
+from jaxbiped.stereo import landmarks, matching
+from jaxbiped.stereo.fit import quality, together
 from jaxbiped.study.fitting import choices, eye, least_contrast, unmarked, watch_from
 from jaxbiped.study.sensors import (
     AREA,

@@ -25,10 +25,10 @@ from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
+from jaxbiped.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.sensing.hashing import from_key
 from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.queues import run_all
-from jaxbiped.study.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.study.walks import walk_all
 
 SCENES = Path(__file__).parent.parent / "configs" / "scenes"

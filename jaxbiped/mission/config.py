@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import pydantic
 
+from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.config import Model
 from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
 from jaxbiped.core.registry import SENSORS as SENSORS_OWN
@@ -17,7 +18,6 @@ from jaxbiped.mission.defaults import BELOW_POINTS as BELOW_POINTS
 from jaxbiped.mission.defaults import SIMULATED as SIMULATED
 from jaxbiped.mission.defaults import SWAYING as SWAYING
 from jaxbiped.mission.defaults import with_defaults
-from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.config import HEIGHT_TOLERANCE, DurationConfig, RobotConfig
 from jaxbiped.sensing.config import CameraConfig, LandmarkConfig, NoiseConfig, OdometryConfig, VisualConfig
 from jaxbiped.sensing.presets import PRESETS, sensor_preset

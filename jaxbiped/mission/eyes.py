@@ -60,12 +60,12 @@ class StereoEyes:
         Raises:
           InputError: nothing can be rendered on this machine.
         """
-        from jaxbiped.sensing.stereo.measure import StereoSensor  # loads MuJoCo, and how it renders
+        from jaxbiped.stereo.measure import StereoSensor  # loads MuJoCo, and how it renders
 
         self.sensor = StereoSensor(camera)
         self.marked, self.tracker = localisation == "landmarks", None
         if localisation in VISUAL:
-            from jaxbiped.sensing.stereo.tracking import Tracker
+            from jaxbiped.stereo.tracking import Tracker
 
             self.tracker = Tracker(self.sensor.rig)
         self.last: Shot | None = None

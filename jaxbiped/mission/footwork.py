@@ -16,12 +16,12 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float64
 
+from jaxbiped.biped import request as ask
+from jaxbiped.biped.config import RobotModelConfig
+from jaxbiped.biped.gait import generate
+from jaxbiped.biped.request import Request
 from jaxbiped.mission.config import WalkConfig as WalkConfig
-from jaxbiped.motion import request as ask
-from jaxbiped.motion.biped import RobotModelConfig
-from jaxbiped.motion.gait import generate
 from jaxbiped.motion.primitives import Primitive
-from jaxbiped.motion.request import Request
 
 Pace = Literal["fast", "paper"]
 

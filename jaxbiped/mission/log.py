@@ -61,7 +61,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Walk:
-    """How a simulated biped moved: `F` states of `physics.robot.robot_spec`, in their order."""
+    """How a simulated biped moved: `F` states of `biped.model.robot_spec`, in their order."""
 
     qpos: Float32[np.ndarray, "F 19"]  # hips (x, y, z) [m], their quaternion (w, x, y, z), 12 joint angles [rad]
     moment: Float32[np.ndarray, "F"]  # when, in moments of the log: 2.5 is half way from the third to the fourth

@@ -17,7 +17,7 @@ NEAREST, FURTHEST, SPACING = -0.02, 0.20, 0.0025  # [m] ahead of the middle betw
 NONE = 1.0  # [m] where no edge is found
 KICK = 0.01  # [m] above what it may step on that a foot may touch
 FOOT_TOP = 0.045  # [m] below which only feet are
-# The upper body of the simulated biped (physics.robot), two lying capsules: half width and radius, and how far below
+# The upper body of the simulated biped (biped.model), two lying capsules: half width and radius, and how far below
 # the camera's top they begin and end [m].
 HEAD, TORSO = (0.060, 0.015, 0.0, 0.030), (0.020, 0.040, 0.058, 0.138)
 LATERAL = np.linspace(-1.0, 1.0, 9)  # where across the body it is checked

@@ -21,6 +21,8 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 from jaxbiped import physics
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import refuse_terrain
+from jaxbiped.biped.gait import TIMESTEP
+from jaxbiped.biped.model import robot_spec
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
@@ -45,9 +47,7 @@ from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Setting
 from jaxbiped.mission.stage import Stage
 from jaxbiped.mission.state import Carriage, Mind, World, start
 from jaxbiped.mission.stepped import Mission, Played, Recorder
-from jaxbiped.motion.gait import TIMESTEP
 from jaxbiped.motion.primitives import CELL, Command, Primitive
-from jaxbiped.physics.robot import robot_spec
 
 SLICE = 32  # steps (0.16 s) between two looks at who is done
 SETTLE = 0.3  # [s] that a robot stands before it measures

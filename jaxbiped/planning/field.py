@@ -21,13 +21,13 @@ from jaxbiped.core.program_cache import keep_programs
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.devices import by_rows, cores, mesh_of
 from jaxbiped.errors import InputError
-from jaxbiped.planning import compiled, wavefront
+from jaxbiped.planning import kernels, wavefront
 from jaxbiped.planning.arguments import are_classes, grid_arguments
 from jaxbiped.planning.costs import Costs, Rules, half_edges, tables
 
 keep_programs()
-METHODS = ("wavefront", *compiled.METHODS)
-CHUNK = compiled.LANES  # arenas settled together: what fits the cache
+METHODS = ("wavefront", *kernels.METHODS)
+CHUNK = kernels.LANES  # arenas settled together: what fits the cache
 PIECES = 4  # for each core, so that a slow piece does not leave the other cores idle
 LARGE, FEW = 1200, 4  # cells of a large grid; fewer of these at once are settled one by one,
 HUGE = 1 << 17  # as grids of more cells than that are, however many there are
@@ -139,7 +139,7 @@ def _from_grids(classes, levels, each, goal_ij) -> CostToGo:
     valid &= are_classes(classes)
     goal_ij = jnp.where(valid[:, None], goal_ij, -1)
     with jax.enable_x64(True):
-        cost, steps, settled = compiled.solve_grids(read, classes, levels, goal_ij)
+        cost, steps, settled = kernels.solve_grids(read, classes, levels, goal_ij)
         return CostToGo(cost, steps, valid & settled)
 
 
@@ -188,7 +188,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
     if batch <= CHUNK or jax.default_backend() != "cpu":
         return solve(jax.tree.map(jnp.asarray, inputs), method)
     size = min(batch, CHUNK * -(-batch // (CHUNK * PIECES * cores())))
-    out = CostToGo(compiled.aligned((batch, *grid), np.float32), np.empty(batch, np.int32), np.empty(batch, bool))
+    out = CostToGo(kernels.aligned((batch, *grid), np.float32), np.empty(batch, np.int32), np.empty(batch, bool))
     direct = solve is _field and method == "line_sweep"
     inputs, valid = _prepared(inputs) if direct else (jax.tree.map(np.asarray, inputs), True)
 
@@ -197,7 +197,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
         rows = slice(stop - size, stop)  # the last one overlaps the one before: one program
         part = jax.tree.map(lambda a: a[rows], inputs)
         if direct:
-            compiled.solve_arrays(*part, out.cost[rows], out.iterations[rows], out.converged[rows])
+            kernels.solve_arrays(*part, out.cost[rows], out.iterations[rows], out.converged[rows])
         else:
             jax.tree.map(lambda whole, a: np.copyto(whole[rows], a), out, solve(part, method))
 
@@ -208,7 +208,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
 
 
 def _prepared(inputs):
-    """Arguments of `compiled.solve_arrays`, all but its results; and which arenas are valid."""
+    """Arguments of `kernels.solve_arrays`, all but its results; and which arenas are valid."""
     classes, levels, each, goal_ij = inputs
     read, valid = _tables(each)
     valid = np.asarray(valid)
@@ -225,7 +225,7 @@ def _solve(edges, goal_ij, method: str, valid) -> CostToGo:
         if method == "wavefront":
             cost, steps, settled = wavefront.solve_edges(edges, goal_ij)
         else:
-            cost, steps, settled = compiled.solve_edges(edges, goal_ij, method)
+            cost, steps, settled = kernels.solve_edges(edges, goal_ij, method)
         return CostToGo(cost, steps.astype(jnp.int32), valid & settled)
 
 

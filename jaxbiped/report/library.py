@@ -8,10 +8,10 @@ from collections.abc import Mapping
 import numpy as np
 import polars as pl
 
+from jaxbiped.biped.config import RobotModelConfig
+from jaxbiped.biped.gait import PrimitiveTable
+from jaxbiped.biped.trial import RIMS, nominal_edge
 from jaxbiped.mission.library import Entry, Feet, LibraryConfig, Rims, Window
-from jaxbiped.motion.biped import RobotModelConfig
-from jaxbiped.motion.gait import PrimitiveTable
-from jaxbiped.physics.trial import RIMS, nominal_edge
 
 SET = "mild"  # whose trials the library's displacements are of
 

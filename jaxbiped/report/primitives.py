@@ -14,9 +14,9 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from rich.console import Group
 
+from jaxbiped.biped.gait import PrimitiveTable
 from jaxbiped.files import write_whole
 from jaxbiped.mission.library import LibraryConfig
-from jaxbiped.motion.gait import PrimitiveTable
 from jaxbiped.report.library import displacement
 from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich

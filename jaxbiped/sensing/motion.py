@@ -1,6 +1,6 @@
 """Visual odometry of the ray-cast sensor: what a camera tells of the robot's own motion from one view to the next.
 
-`sensing.stereo.tracking` measures it in pictures. Here is a model of that: it takes points that both views show, and
+`stereo.tracking` measures it in pictures. Here is a model of that: it takes points that both views show, and
 has errors of the size that rendered pictures have.
 """
 

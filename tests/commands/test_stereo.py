@@ -21,8 +21,8 @@ from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.chart import ONE_LOOK, lay_out, make_chart
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.motion.robot import RobotConfig
-from jaxbiped.sensing.stereo import Disparity, to_points
-from jaxbiped.sensing.stereo.calibration_files import load_rig
+from jaxbiped.stereo import Disparity, to_points
+from jaxbiped.stereo.calibration_files import load_rig
 
 CAMERA = Path(__file__).parents[2] / "configs" / "cameras" / "motorcycle.toml"
 

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from jaxbiped.biped import request as ask
+from jaxbiped.biped.gait import home_table
 from jaxbiped.errors import InputError
 from jaxbiped.mission.footwork import ANGLE, PER_METRE, Move, WalkConfig, requests, targets
-from jaxbiped.motion import request as ask
-from jaxbiped.motion.gait import home_table
 from jaxbiped.motion.primitives import Primitive
 
 ROBOT = WalkConfig().biped

@@ -13,7 +13,7 @@ from jax import lax
 from jaxbiped import planning
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.planning.compiled import solvers
+from jaxbiped.planning.kernels import solvers
 from tests.planning import oracle
 
 H, W, B = 9, 11, 150  # 150: more than one chunk, and not a multiple of it

@@ -11,7 +11,7 @@ import pytest
 from numba import njit
 
 from jaxbiped.core.cache_folder import VARIABLE, cache_folder
-from jaxbiped.planning.compiled import foreign, objects
+from jaxbiped.planning.kernels import foreign, objects
 
 NAME = "jaxbiped_test_doubled"
 
@@ -132,7 +132,7 @@ import sys
 import jax
 import numpy as np
 from jaxbiped import planning
-from jaxbiped.planning.compiled import foreign
+from jaxbiped.planning.kernels import foreign
 
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 missed = []
@@ -167,7 +167,7 @@ import sys
 import jax, jax.numpy as jnp, numpy as np
 from numba import njit
 from jaxbiped.jax_settings import own_settings
-from jaxbiped.planning.compiled import foreign
+from jaxbiped.planning.kernels import foreign
 
 factor = int(sys.argv[1])
 

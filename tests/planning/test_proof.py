@@ -8,8 +8,8 @@ from numba import njit
 
 from jaxbiped import planning
 from jaxbiped.planning import wavefront
-from jaxbiped.planning.compiled import LANES, foreign, grids, heading, heading_sweep, line_sweep, solvers
 from jaxbiped.planning.costs import Costs, Rules, tables
+from jaxbiped.planning.kernels import LANES, foreign, grids, heading, heading_sweep, line_sweep, solvers
 
 H, W = 5, 7
 CLASSES = np.ones((LANES, H, W), np.int8)

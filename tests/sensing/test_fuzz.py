@@ -18,9 +18,9 @@ from jaxbiped.sensing import VisualConfig as Visual
 from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.localisation import predict_seen
 from jaxbiped.sensing.motion import track
-from jaxbiped.sensing.stereo import Disparity, MatchParams, StereoCamera, ideal, to_points
-from jaxbiped.sensing.stereo import match as match_pair
 from jaxbiped.sensing.view import Motion
+from jaxbiped.stereo import Disparity, MatchParams, StereoCamera, ideal, to_points
+from jaxbiped.stereo import match as match_pair
 from tests import fuzzing
 from tests.fuzzing import close, mapped, same, spoiled
 from tests.sensing.scenes import as_jax, make

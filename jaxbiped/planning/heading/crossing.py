@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float, Int, Int8
 
 from jaxbiped.core.batching import folding_vmap, unfold
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.planning import compiled
+from jaxbiped.planning import kernels
 from jaxbiped.planning.arguments import grid_arguments
 from jaxbiped.planning.costs import DIRECTIONS
 
@@ -48,7 +48,7 @@ def crossing_faces(classes: Any, levels: Any, pitch: float) -> Int8[Array, "*B 8
 @cache
 def on_cpu(half: int):
     """The compiled kernel for a window of `half` cells, as a function that `vmap` knows what to do with."""
-    return folding_vmap(lambda known, levels: compiled.crossing_faces(known, levels, half, SLANT))
+    return folding_vmap(lambda known, levels: kernels.crossing_faces(known, levels, half, SLANT))
 
 
 def window(pitch: float) -> int:
