@@ -34,6 +34,7 @@ import numpy as np
 
 from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.core.names import STRATEGIES
 from jaxbiped.devices import cores
 from jaxbiped.mission import decision
 from jaxbiped.mission.cycle import conclude, cycle, sense
@@ -45,7 +46,6 @@ from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import draw, evaluate
-from jaxbiped.study.names import STRATEGIES
 from jaxbiped.study.queues import run_all
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

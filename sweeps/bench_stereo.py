@@ -24,11 +24,11 @@ import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
 from jaxbiped.geometry.pose import wrap_angle
+from jaxbiped.localisation.kalman_filter import Belief, correct
 from jaxbiped.mapping import Cell
 from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.sensing.camera import CameraConfig
-from jaxbiped.sensing.localisation import Belief, correct
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.stereo import landmarks, matching
 from jaxbiped.stereo.fit import quality, together

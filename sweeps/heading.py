@@ -40,10 +40,10 @@ from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.motion.primitives import DurationConfig
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
+from jaxbiped.statistics.intervals import mean_and_median, proportion
 from jaxbiped.study.config import StrategyName
 from jaxbiped.study.durations import fit
 from jaxbiped.study.evaluate import draw
-from jaxbiped.study.intervals import mean_and_median, proportion
 
 TOGETHER = 128  # arenas
 SAME, WORTH = 0.01, 0.5  # [s]

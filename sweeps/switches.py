@@ -22,10 +22,10 @@ from rich.console import Console
 
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.report.tables import terminal
-from jaxbiped.study.comparison import compare_named
+from jaxbiped.statistics.comparison import compare_named
+from jaxbiped.statistics.schema import FAMILIES
 from jaxbiped.study.config import Family, StrategyName, StudyConfig
 from jaxbiped.study.evaluate import evaluate
-from jaxbiped.study.schema import FAMILIES
 
 Executor = Literal["kinematic", "sampled", "native", "mjx"]
 

@@ -9,6 +9,8 @@ from typing import Any
 
 from jaxbiped.arenas.source import Family, as_family
 from jaxbiped.core.component import as_component
+from jaxbiped.core.names import BUILT_IN_METRICS
+from jaxbiped.core.names import STRATEGIES as BUILT_IN_STRATEGIES
 from jaxbiped.core.registry import EXECUTORS, FAMILIES, METRICS, SENSORS, STRATEGIES, Registry
 from jaxbiped.errors import InputError
 from jaxbiped.mission.config import EXECUTORS as BUILT_IN_EXECUTORS
@@ -17,8 +19,6 @@ from jaxbiped.mission.execution import Executor
 from jaxbiped.mission.metric import Metric, as_metric, column_of
 from jaxbiped.mission.sensors import Sensor
 from jaxbiped.mission.strategies import Strategy, as_strategy
-from jaxbiped.study.names import BUILT_IN_METRICS
-from jaxbiped.study.names import STRATEGIES as BUILT_IN_STRATEGIES
 
 NAME = re.compile(r"[A-Za-z][\w.+-]{0,39}")  # of a sensor or an executor
 KINDS = (

@@ -14,8 +14,8 @@ from jaxbiped.commands.options.stereo import StereoArgs
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.formats.cloud import save_ply
 from jaxbiped.mapping.floor import Floor, find_floor
-from jaxbiped.sensing.cloud import save_ply
 from jaxbiped.stereo.calibration_files import load_rig
 from jaxbiped.stereo.images import as_rgb, load_pair
 from jaxbiped.stereo.matching import match

@@ -12,6 +12,7 @@ from jaxtyping import Array, Int
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.movers import at_time, only
 from jaxbiped.geometry.pose import wrap_angle
+from jaxbiped.localisation.kalman_filter import predict
 from jaxbiped.mission.decision import Thought, climbed, decide
 from jaxbiped.mission.encounter import met
 from jaxbiped.mission.execution import Execution, execution_of
@@ -25,7 +26,6 @@ from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import landmarks
 from jaxbiped.sensing.hashing import fold
-from jaxbiped.sensing.localisation import predict
 from jaxbiped.sensing.view import Sightings, View
 
 SENSE = 1  # channel of a mission's seed

@@ -13,12 +13,12 @@ from jaxtyping import Array, Bool, Float, UInt32
 
 from jaxbiped.arenas.arena import Arena, Landmarks
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation.kalman_filter import Belief, correct, predict_seen
+from jaxbiped.localisation.scan_match import add_walls, find_walls, match, picture_shape
 from jaxbiped.mapping import level_view
-from jaxbiped.mapping.scan_match import add_walls, find_walls, match, picture_shape
 from jaxbiped.mission.settings import ICP, VISUAL, Program, Settings
 from jaxbiped.mission.state import Anchor, Mind, World
 from jaxbiped.sensing.camera import mount
-from jaxbiped.sensing.localisation import Belief, correct, predict_seen
 from jaxbiped.sensing.motion import track
 from jaxbiped.sensing.view import Sightings, View
 

@@ -13,13 +13,13 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.localisation.kalman_filter import Belief
+from jaxbiped.localisation.scan_match import Outlines, no_outlines
 from jaxbiped.mapping import GridMap, GridSpec, empty
-from jaxbiped.mapping.scan_match import Outlines, no_outlines
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import ICP, VISUAL, Settings
 from jaxbiped.sensing.edges import Edge, unknown
-from jaxbiped.sensing.localisation import Belief
 
 
 @jax.tree_util.register_dataclass

@@ -10,8 +10,8 @@ from jaxbiped.report.measures import SUCCESS as SUCCESS
 from jaxbiped.report.measures import TIME as TIME
 from jaxbiped.report.measures import Measure as Measure
 from jaxbiped.report.words import AHEAD, BEHIND, OPEN, interval, p_value, percent, signed
-from jaxbiped.study import ALL, Comparison, Estimate, PairComparison, PairedMetric
-from jaxbiped.study.intervals import NOTHING
+from jaxbiped.statistics import ALL, Comparison, Estimate, PairComparison, PairedMetric
+from jaxbiped.statistics.intervals import NOTHING
 
 ALPHA = 0.05
 

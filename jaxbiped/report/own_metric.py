@@ -16,8 +16,8 @@ from jaxbiped.report.figures import canvas, error_bars, legend_above, look
 from jaxbiped.report.measures import metric_measure
 from jaxbiped.report.style import own_style
 from jaxbiped.report.sweep_figures import scale_x
-from jaxbiped.study.intervals import Estimate, mean_and_median, proportion
-from jaxbiped.study.schema import ordered
+from jaxbiped.statistics.intervals import Estimate, mean_and_median, proportion
+from jaxbiped.statistics.schema import ordered
 
 RESAMPLES = 999
 

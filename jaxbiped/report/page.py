@@ -23,7 +23,8 @@ from jaxbiped.report.tables import (
     success_sheet,
 )
 from jaxbiped.report.words import OPEN, number, signed
-from jaxbiped.study import Comparison, Manifest
+from jaxbiped.statistics import Comparison
+from jaxbiped.study import Manifest
 
 PAGE = "report.html"
 

@@ -15,8 +15,8 @@ from jaxbiped.report.measures import metric_measures
 from jaxbiped.report.svg import INK, LINE, inline, themed
 from jaxbiped.report.tables import Sheet
 from jaxbiped.report.words import OPEN
-from jaxbiped.study import ALL, CODES, Comparison
-from jaxbiped.study.schema import ordered_families
+from jaxbiped.statistics import ALL, CODES, Comparison
+from jaxbiped.statistics.schema import ordered_families
 
 WIDTH = 5.2  # [inch]
 NO_PLAN = "#BFC6CE"

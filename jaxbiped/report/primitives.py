@@ -21,7 +21,7 @@ from jaxbiped.report.library import displacement
 from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.report.words import NONE, number, percent, signed
-from jaxbiped.study.intervals import proportion
+from jaxbiped.statistics.intervals import proportion
 
 Tables = Mapping[str, PrimitiveTable]
 FACTORS = {  # disturbances by themselves: heading, unit, and the value of none

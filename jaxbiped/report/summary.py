@@ -18,7 +18,8 @@ from jaxbiped.report.page import PAGE, Section, page_of, render
 from jaxbiped.report.stopping import stopping_sentences
 from jaxbiped.report.tables import markdown_sheets, to_markdown
 from jaxbiped.report.words import number
-from jaxbiped.study import QUESTION, Comparison, Manifest, compare, read, read_points, sample_size
+from jaxbiped.statistics import QUESTION, Comparison, compare, sample_size
+from jaxbiped.study import Manifest, read, read_points
 from jaxbiped.study.again import Origin
 
 SUMMARY = "summary.md"

@@ -22,8 +22,9 @@ from jaxbiped.report.svg import inline, themed
 from jaxbiped.report.sweep import LIMITATIONS as OF_SWEEPS
 from jaxbiped.report.sweep import SweepReport, grid_axes
 from jaxbiped.report.sweep_figures import Panel, difference_panels, dots, heat_map, rate_panels, scale_x
-from jaxbiped.study import compare, read
-from jaxbiped.study.pointwise import PointResult, SweepResult
+from jaxbiped.statistics import compare
+from jaxbiped.statistics.sweep_points import PointResult, SweepResult
+from jaxbiped.study import read
 
 MOST_ROWS = 256  # of a table: beyond, the page says where the others are
 

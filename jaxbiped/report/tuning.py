@@ -14,8 +14,8 @@ from jaxbiped.report.figures import GRID, INK, saver, style
 from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown
 from jaxbiped.report.words import NONE, brackets, number, percent, signed
+from jaxbiped.statistics.intervals import Estimate
 from jaxbiped.study.durations import Fit
-from jaxbiped.study.intervals import Estimate
 from jaxbiped.study.tune import DURATIONS, START, SWEPT, TUNED, Gap, TuneConfig, Tuning
 
 PAPER = (1.0, 1.0, 5.0, 10.0)  # C0 to C3

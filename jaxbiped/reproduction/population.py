@@ -20,7 +20,7 @@ from jaxbiped.report.tables import Sheet, code_sheet, pair_sheet, strategy_sheet
 from jaxbiped.report.words import signed
 from jaxbiped.reproduction.paper import SAVED
 from jaxbiped.reproduction.saved import Population, break_even, measured_break_even
-from jaxbiped.study.intervals import mean_and_median
+from jaxbiped.statistics.intervals import mean_and_median
 
 BAR, PAPER = "#0072B2", "#D55E00"
 BINS = 30

@@ -14,7 +14,7 @@ from jaxtyping import Int
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.motion.primitives import CELL
 from jaxbiped.reproduction.paper import TABLE_2
-from jaxbiped.study.comparison import ALL, Comparison, PairComparison, compare
+from jaxbiped.statistics.comparison import ALL, Comparison, PairComparison, compare
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import draw
 

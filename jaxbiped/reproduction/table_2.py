@@ -15,7 +15,7 @@ from jaxbiped.biped.spread import MILD
 from jaxbiped.biped.trial import Disturbance, Tolerance
 from jaxbiped.biped.verify import trials
 from jaxbiped.reproduction.paper import TABLE_2
-from jaxbiped.study.intervals import Estimate, proportion
+from jaxbiped.statistics.intervals import Estimate, proportion
 
 NAMES = FIVE
 TITLES = {  # of our primitives: the paper's names, and its times [s]

@@ -24,15 +24,15 @@ from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.statistics.comparison import paired
+from jaxbiped.statistics.schema import KNOWN
+from jaxbiped.statistics.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.arena_kinds import kinds_of
-from jaxbiped.study.comparison import paired
 from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
 from jaxbiped.study.config import OF_COMPONENTS
 from jaxbiped.study.evaluate import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
 from jaxbiped.study.runner import check_mission, play_one, seeing
-from jaxbiped.study.schema import KNOWN
-from jaxbiped.study.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.sweep import point_at
 
 

@@ -28,6 +28,7 @@ from distributed.core import rpc
 from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 
+from jaxbiped.core.names import KNOWN
 from jaxbiped.core.registry import PLACE
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
@@ -37,7 +38,6 @@ from jaxbiped.study import evaluate, worker
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress
 from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
-from jaxbiped.study.names import KNOWN
 from jaxbiped.study.worker import Compute
 
 ANSWER = 5.0  # [s] for the scheduler to answer

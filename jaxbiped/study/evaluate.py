@@ -22,12 +22,12 @@ from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
 from jaxbiped.mission.queue import OnProgress, Tally
 from jaxbiped.sensing.hashing import from_key
+from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.metric_columns import check_metrics, metric_columns
 from jaxbiped.study.rows import frame
 from jaxbiped.study.runner import batch_driver
-from jaxbiped.study.schema import SCHEMA
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 

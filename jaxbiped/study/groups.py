@@ -12,6 +12,7 @@ from jaxtyping import Int
 from jaxbiped.arenas.population import Population, PopulationConfig
 from jaxbiped.arenas.source import OwnFamily, find_family, name_of
 from jaxbiped.core.component import kind_of, numbers_of, traced_component, with_numbers
+from jaxbiped.core.names import MOVING
 from jaxbiped.errors import InputError
 from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.eyes import RENDERED
@@ -23,10 +24,9 @@ from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.arena_kinds import ANY, ArenaKind, kinds_of
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.names import MOVING
-from jaxbiped.study.schema import SCHEMA
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from jaxbiped import files
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.mission.metric import MetricFormat
+from jaxbiped.statistics.schema import validate
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
-from jaxbiped.study.schema import validate
 from jaxbiped.study.store import POINTS, ROWS, Store, broken_shard, create, shard_number, shard_paths
 
 SHOWN = 6  # differing fields in a message

@@ -12,8 +12,8 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.mission.oracle import OraclePlan
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Result
+from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.groups import Group
-from jaxbiped.study.schema import SCHEMA
 
 LABELS = np.array([code.label for code in Code if code != Code.RUNNING])  # by code
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import polars as pl
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.comparison import QUESTION, Comparison, compare_named
-from jaxbiped.study.schema import ordered
+from jaxbiped.statistics.comparison import QUESTION, Comparison, compare_named
+from jaxbiped.statistics.schema import ordered
 from jaxbiped.study.store import Manifest, read, read_points
 
 

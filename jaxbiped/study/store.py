@@ -25,9 +25,9 @@ from jaxbiped.config import Model, config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
 from jaxbiped.mission.metric import MetricFormat
+from jaxbiped.statistics.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
-from jaxbiped.study.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
 from jaxbiped.terminal import command_line
 
 POINTS, ROWS = "points.parquet", "rows"

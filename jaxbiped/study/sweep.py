@@ -13,11 +13,11 @@ import tyro
 
 from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
+from jaxbiped.core.names import KNOWN
 from jaxbiped.errors import InputError
 from jaxbiped.mission.config import MissionConfig
 from jaxbiped.study.axes import Axis, Sobol, told
 from jaxbiped.study.config import OF_COMPONENTS, StudyConfig
-from jaxbiped.study.names import KNOWN
 
 if TYPE_CHECKING:
     from jaxbiped.study.groups import Point

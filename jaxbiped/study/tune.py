@@ -13,10 +13,10 @@ from jaxtyping import Float, Int
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import OnProgress, Result, Tally, tally
 from jaxbiped.mission.settings import CostConfig, MissionConfig
+from jaxbiped.statistics.intervals import Estimate, mean_and_median
+from jaxbiped.statistics.paired import PairedMetric, metric_difference, success_difference
 from jaxbiped.study.durations import fit
 from jaxbiped.study.evaluate import Progress
-from jaxbiped.study.intervals import Estimate, mean_and_median
-from jaxbiped.study.paired import PairedMetric, metric_difference, success_difference
 from jaxbiped.study.search import directions, gradient, sobol
 from jaxbiped.study.trials import NAMES, Trials, objective
 from jaxbiped.study.tuning_config import TuneConfig as TuneConfig

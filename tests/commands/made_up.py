@@ -12,7 +12,7 @@ from skimage import data
 
 from jaxbiped.commands import compare, fit_sensor, plan, reproduce, run, scenario, sweep
 from jaxbiped.commands.plan import Plan
-from jaxbiped.mapping.moving_ai import load_map, load_scenario
+from jaxbiped.formats.moving_ai import load_map, load_scenario
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.stepped import Mission
 from jaxbiped.reproduction import EXPERIMENTS

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.core.names import STRATEGIES
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.queue import Jobs, compile_queue, stack
 from jaxbiped.mission.settings import MissionConfig, program
@@ -18,7 +19,6 @@ from jaxbiped.mission.stepped import turn_once
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
 from jaxbiped.study.evaluate import draw
-from jaxbiped.study.names import STRATEGIES
 from tests.mission.replay import Moment
 
 ARENAS, SETTINGS, JOBS, SLOTS = 32, 16, 32, 8

@@ -4,12 +4,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation.kalman_filter import Belief
 from jaxbiped.mapping import Cell, GridSpec, classify, empty
 from jaxbiped.mapping.params import MapConfig
 from jaxbiped.mission.judging import BACK, back_off, feel, hindered
 from jaxbiped.mission.state import Mind
 from jaxbiped.motion.primitives import Command
-from jaxbiped.sensing.localisation import Belief
 
 SPEC = GridSpec(size_x=0.6, size_y=0.45)
 

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation import Belief
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.decision import LOOK_AROUND
@@ -22,7 +23,6 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.motion.selection import stride
 from jaxbiped.planning import DIRECTIONS
-from jaxbiped.sensing import Belief
 from jaxbiped.sensing.hashing import fold
 from tests.reference import mapping, motion, planning, sensing
 

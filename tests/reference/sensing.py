@@ -11,9 +11,10 @@ import numpy as np
 
 from jaxbiped.arenas.arena import SQUARE
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.sensing import Belief, Sightings, View, hashing
+from jaxbiped.localisation import Belief
+from jaxbiped.localisation.kalman_filter import GATE, LEAST_VARIANCE, ROUNDS
+from jaxbiped.sensing import Sightings, View, hashing
 from jaxbiped.sensing.landmarks import LANDMARK
-from jaxbiped.sensing.localisation import GATE, LEAST_VARIANCE, ROUNDS
 from jaxbiped.sensing.noise import ATTITUDE, HIDING_REACH, MATCH, PHANTOM, PHANTOM_BLOCK
 from jaxbiped.sensing.odometry import ODOMETRY
 

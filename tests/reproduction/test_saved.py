@@ -16,7 +16,7 @@ from jaxbiped.reproduction.saved import (
     population,
     study,
 )
-from jaxbiped.study.schema import SCHEMA
+from jaxbiped.statistics.schema import SCHEMA
 
 CONFIG = study(20, 3, "sampled")
 

@@ -10,9 +10,9 @@ import pytest
 from jaxbiped.arenas.arena import CIRCLE, SQUARE
 from jaxbiped.arenas.scene import BoxConfig, LandmarkConfig, SceneConfig, to_arena
 from jaxbiped.geometry.pose import Pose, wrap_angle
+from jaxbiped.localisation.kalman_filter import Belief, correct
 from jaxbiped.sensing.camera import CameraConfig, mount, placed
 from jaxbiped.sensing.landmarks import RENDERED
-from jaxbiped.sensing.localisation import Belief, correct
 from jaxbiped.sensing.view import Sightings
 from jaxbiped.stereo import landmarks as marks
 from jaxbiped.stereo import scene

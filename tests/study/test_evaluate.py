@@ -12,9 +12,9 @@ from jaxbiped.arenas.families import FAMILIES
 from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.mission import queue
 from jaxbiped.mission.queue import stack
+from jaxbiped.statistics.schema import validate
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import draw, evaluate
-from jaxbiped.study.schema import validate
 from jaxbiped.study.sweep import SweepConfig
 
 EVENTS = []

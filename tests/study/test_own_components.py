@@ -18,8 +18,8 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.planning import Costs
 from jaxbiped.planning.planners import GridPlanner, Route, StraightLine, check_route
+from jaxbiped.statistics.comparison import compare
 from jaxbiped.study.again import play_again
-from jaxbiped.study.comparison import compare
 from jaxbiped.study.conduct import conduct, in_order, shard_rows
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.groups import families_of, group_points, only_point, shards

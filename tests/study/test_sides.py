@@ -5,7 +5,8 @@ import pytest
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.study import compare, create
+from jaxbiped.statistics import compare
+from jaxbiped.study import create
 from jaxbiped.study.sides import choose, compare_sides, open_stored, side_by_side
 from tests.study.synthetic import rows
 

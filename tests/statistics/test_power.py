@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.paired import mcnemar
-from jaxbiped.study.power import connor_sample_size, mcnemar_power, sample_size
+from jaxbiped.statistics.paired import mcnemar
+from jaxbiped.statistics.power import connor_sample_size, mcnemar_power, sample_size
 
 
 def test_connors_formula_on_its_published_calculators():

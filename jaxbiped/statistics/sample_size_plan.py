@@ -11,9 +11,9 @@ from scipy import stats
 from statsmodels.stats.power import TTestPower
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.comparison import paired
-from jaxbiped.study.intervals import proportion
-from jaxbiped.study.power import sample_size
+from jaxbiped.statistics.comparison import paired
+from jaxbiped.statistics.intervals import proportion
+from jaxbiped.statistics.power import sample_size
 
 MEASURES = ("success", "distance", "time")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from jaxbiped.study.intervals import NOTHING, bootstrap, mean_and_median, paired_difference, proportion
-from jaxbiped.study.paired import improvement
+from jaxbiped.statistics.intervals import NOTHING, bootstrap, mean_and_median, paired_difference, proportion
+from jaxbiped.statistics.paired import improvement
 
 # Of N simulated intervals at level 0.95, the share that covers is within 4 binomial standard errors of the truth.
 # `slack` is the documented small-sample error of the method on top of that.

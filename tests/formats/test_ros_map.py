@@ -10,7 +10,7 @@ import yaml
 from PIL import Image
 
 from jaxbiped.errors import InputError
-from jaxbiped.mapping import ros_map
+from jaxbiped.formats import ros_map
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.inflate import inflate

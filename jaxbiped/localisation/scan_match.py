@@ -24,8 +24,8 @@ from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.geometry.small import matrix, product
+from jaxbiped.localisation.kalman_filter import GATE_POSE, Belief, inverse
 from jaxbiped.mapping.grid import GridSpec
-from jaxbiped.sensing.localisation import GATE_POSE, Belief, inverse
 from jaxbiped.sensing.view import View
 
 STEP = 8  # [px] between two points of a picture's column that are compared

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from jaxbiped.study.intervals import paired_difference
-from jaxbiped.study.paired import (
+from jaxbiped.statistics.intervals import paired_difference
+from jaxbiped.statistics.paired import (
     equivalent_mean,
     equivalent_success,
     holm,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from pypcd4 import Encoding, PointCloud
 
 from jaxbiped.errors import InputError
-from jaxbiped.sensing import cloud
-from jaxbiped.sensing.cloud import load, recentred, save_ply
+from jaxbiped.formats import cloud
+from jaxbiped.formats.cloud import load, recentred, save_ply
 
 POINTS = np.random.default_rng(0).uniform(-3, 3, (500, 3)).astype(np.float32)
 

@@ -16,9 +16,9 @@ import numpy as np
 import polars as pl
 from jaxtyping import Float
 
-from jaxbiped.study.comparison import paired
-from jaxbiped.study.intervals import NOTHING, Estimate
-from jaxbiped.study.names import MEASURES as MEASURES
+from jaxbiped.core.names import MEASURES as MEASURES
+from jaxbiped.statistics.comparison import paired
+from jaxbiped.statistics.intervals import NOTHING, Estimate
 
 FIRST_LOOK = 100  # samples: "asymptotic" means nothing before
 

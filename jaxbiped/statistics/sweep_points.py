@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from jaxbiped.study.comparison import ALL, QUESTION, PairComparison, compare_pair
-from jaxbiped.study.intervals import Estimate, proportion
-from jaxbiped.study.schema import ordered
+from jaxbiped.statistics.comparison import ALL, QUESTION, PairComparison, compare_pair
+from jaxbiped.statistics.intervals import Estimate, proportion
+from jaxbiped.statistics.schema import ordered
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 from scipy import stats
 
-from jaxbiped.study.metric_pairs import metric_means, metric_pairs, without_rounding
+from jaxbiped.statistics.metric_differences import metric_means, metric_pairs, without_rounding
 
 OPTIONS = {"seed": 3, "resamples": 199, "level": 0.95}
 

@@ -11,7 +11,7 @@ from scipy import stats
 from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.weightstats import DescrStatsW
 
-from jaxbiped.study.intervals import NOTHING, Estimate, mean_and_median, paired_difference, score_statistic
+from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_and_median, paired_difference, score_statistic
 
 EXACT_LIMIT = 50  # samples up to which the signed-rank test is exact
 

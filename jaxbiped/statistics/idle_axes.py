@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import polars as pl
 
-from jaxbiped.study.schema import SCHEMA
+from jaxbiped.statistics.schema import SCHEMA
 
 SAME = 1e-6  # that numbers of two missions may differ by
 # What a mission came to. Costs of plans are not among it: they change with the costs where the way does not.

@@ -5,9 +5,9 @@ import polars as pl
 import pytest
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.comparison import ALL, compare_named
-from jaxbiped.study.equivalence import equivalences
-from jaxbiped.study.paired import equivalent_mean, equivalent_success
+from jaxbiped.statistics.comparison import ALL, compare_named
+from jaxbiped.statistics.equivalence import equivalences
+from jaxbiped.statistics.paired import equivalent_mean, equivalent_success
 from tests.study.synthetic import rows
 
 FRAME = rows(240)

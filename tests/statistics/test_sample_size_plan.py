@@ -6,8 +6,8 @@ import pytest
 from scipy import stats
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.paired import mcnemar
-from jaxbiped.study.pilot import paired_t_sample_size, plan
+from jaxbiped.statistics.paired import mcnemar
+from jaxbiped.statistics.sample_size_plan import paired_t_sample_size, plan
 from tests.study.synthetic import rows
 
 FRAME = rows(240)

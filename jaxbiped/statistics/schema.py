@@ -7,14 +7,14 @@ from collections.abc import Iterable
 
 import polars as pl
 
+from jaxbiped.core.names import CODES as CODES
+from jaxbiped.core.names import FAMILIES as FAMILIES
+from jaxbiped.core.names import KNOWN as KNOWN
+from jaxbiped.core.names import MOVING as MOVING
+from jaxbiped.core.names import REACHED as REACHED
+from jaxbiped.core.names import SCENE as SCENE
+from jaxbiped.core.names import STRATEGIES as STRATEGIES
 from jaxbiped.errors import InputError
-from jaxbiped.study.names import CODES as CODES
-from jaxbiped.study.names import FAMILIES as FAMILIES
-from jaxbiped.study.names import KNOWN as KNOWN
-from jaxbiped.study.names import MOVING as MOVING
-from jaxbiped.study.names import REACHED as REACHED
-from jaxbiped.study.names import SCENE as SCENE
-from jaxbiped.study.names import STRATEGIES as STRATEGIES
 
 FAMILY_NAME = r"^[\w][\w .+-]{0,79}$"
 STRATEGY_NAME = r"^[A-Za-z][\w .+-]{0,39}$"

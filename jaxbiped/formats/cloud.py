@@ -14,8 +14,8 @@ from jaxtyping import Float32, Float64, UInt8
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
-from jaxbiped.sensing.pcd import read_pcd
-from jaxbiped.sensing.ply import read_ply
+from jaxbiped.formats.pcd import read_pcd
+from jaxbiped.formats.ply import read_ply
 
 SUFFIXES = (".npz", ".npy", ".ply", ".pcd")
 AT_ONCE = 1_000_000  # points that are looked at a time

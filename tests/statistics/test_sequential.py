@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 from scipy import optimize, stats
 
-from jaxbiped.study.sequential import (
+from jaxbiped.statistics.sequential import (
     FIRST_LOOK,
     Goal,
     Watch,

@@ -4,9 +4,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from jaxbiped.study.intervals import proportion
-from jaxbiped.study.paired import metric_difference, success_difference
-from jaxbiped.study.pointwise import own_point, pointwise
+from jaxbiped.statistics.intervals import proportion
+from jaxbiped.statistics.paired import metric_difference, success_difference
+from jaxbiped.statistics.sweep_points import own_point, pointwise
 from tests.study.synthetic import rows
 
 STRATEGIES = ("full", "floor_only")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.errors import InputError
-from jaxbiped.mapping import moving_ai
+from jaxbiped.formats import moving_ai
 from jaxbiped.mapping.grid import Cell
 
 DATA = Path(__file__).parent.parent / "data"

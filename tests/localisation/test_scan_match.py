@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation import Belief
+from jaxbiped.localisation import scan_match as ours
 from jaxbiped.mapping import GridSpec
-from jaxbiped.mapping import scan_match as ours
-from jaxbiped.sensing import Belief, View
+from jaxbiped.sensing import View
 
 SPEC = GridSpec()
 ROWS, COLUMNS = 12, 16

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import polars as pl
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.comparison import Stratum, paired, strata
-from jaxbiped.study.intervals import Estimate
-from jaxbiped.study.paired import equivalent_mean, equivalent_success, holm
+from jaxbiped.statistics.comparison import Stratum, paired, strata
+from jaxbiped.statistics.intervals import Estimate
+from jaxbiped.statistics.paired import equivalent_mean, equivalent_success, holm
 
 MEASURES = ("success", "distance", "time")
 

@@ -7,9 +7,9 @@ import polars as pl
 import pytest
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.comparison import ALL, compare, default_pairs
-from jaxbiped.study.paired import holm, signed_rank, success_difference
-from jaxbiped.study.schema import CODES, STRATEGIES
+from jaxbiped.statistics.comparison import ALL, compare, default_pairs
+from jaxbiped.statistics.paired import holm, signed_rank, success_difference
+from jaxbiped.statistics.schema import CODES, STRATEGIES
 from tests.study.synthetic import rows
 
 FRAME = rows(120)

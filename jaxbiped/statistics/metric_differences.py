@@ -10,8 +10,8 @@ import numpy as np
 import polars as pl
 from jaxtyping import Float
 
-from jaxbiped.study.intervals import NOTHING, Estimate, mean_estimate
-from jaxbiped.study.paired import PairedMetric, holm, paired_metric
+from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_estimate
+from jaxbiped.statistics.paired import PairedMetric, holm, paired_metric
 
 SECOND = "#second"  # after a column of the second side: no name of a column ends so
 ROUNDING = 1e-6  # of the greater number: what agrees within it is a tie, as sums of floats in another order do

@@ -12,10 +12,10 @@ from jaxtyping import Float
 
 from jaxbiped.errors import InputError
 from jaxbiped.mission.metric import MetricFormat
-from jaxbiped.study.intervals import NOTHING, Estimate, mean_and_median, proportion
-from jaxbiped.study.metric_pairs import corrected_metrics, metric_means, metric_pairs
-from jaxbiped.study.paired import PairedMetric, holm, metric_difference, success_difference
-from jaxbiped.study.schema import CODES, metric_columns, ordered, ordered_families, validate
+from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_and_median, proportion
+from jaxbiped.statistics.metric_differences import corrected_metrics, metric_means, metric_pairs
+from jaxbiped.statistics.paired import PairedMetric, holm, metric_difference, success_difference
+from jaxbiped.statistics.schema import CODES, metric_columns, ordered, ordered_families, validate
 
 OWN = 1  # of the seed of bootstraps that are of one strategy alone
 QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about

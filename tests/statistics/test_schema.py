@@ -4,7 +4,7 @@ import polars as pl
 import pytest
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.schema import SCHEMA, validate
+from jaxbiped.statistics.schema import SCHEMA, validate
 from tests.study.synthetic import rows
 
 FRAME = rows(12)

@@ -5,7 +5,7 @@ import itertools
 import polars as pl
 import pytest
 
-from jaxbiped.study.idle_axes import IdleSpan, idle_spans
+from jaxbiped.statistics.idle_axes import IdleSpan, idle_spans
 from tests.study.synthetic import rows
 
 FRAME = rows(12, strategies=("full", "floor_only"))

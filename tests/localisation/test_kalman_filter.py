@@ -7,7 +7,8 @@ from scipy import stats
 
 from jaxbiped.arenas.arena import Landmarks
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.sensing import Belief, OdometryConfig, Sightings, correct, drift, hashing, known, predict
+from jaxbiped.localisation import Belief, correct, known, predict
+from jaxbiped.sensing import OdometryConfig, Sightings, drift, hashing
 from tests.reference import sensing as reference
 from tests.sensing.scenes import as_numpy
 
