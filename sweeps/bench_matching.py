@@ -22,8 +22,8 @@ from jaxbiped.arenas import sample
 from jaxbiped.commands.stereo import UNKNOWN_CONE, level_frame
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Cell, GridSpec, truth_grid
-from jaxbiped.mapping.chart import ONE_LOOK, make_chart
 from jaxbiped.mapping.floor import find_floor
+from jaxbiped.mapping.scan_map import ONE_LOOK, make_chart
 from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.sensing.camera import CameraConfig, mount, placed
 from jaxbiped.stereo import MatchParams, ideal, match, to_points

@@ -37,10 +37,10 @@ from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.core.names import STRATEGIES
 from jaxbiped.devices import cores
 from jaxbiped.mission import decision
+from jaxbiped.mission.batched_driver import SLOTS, stack
 from jaxbiped.mission.cycle import conclude, cycle, sense
 from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.goal import goal_cell
-from jaxbiped.mission.queue import SLOTS, stack
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock

@@ -33,8 +33,8 @@ from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.mapping import truth_grid
 from jaxbiped.mission.decision import nearest_direction
-from jaxbiped.mission.following import follow
 from jaxbiped.mission.goal import goal_cell
+from jaxbiped.mission.plan_rollout import follow
 from jaxbiped.mission.route import pose_problem
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.motion.primitives import DurationConfig

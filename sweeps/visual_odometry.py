@@ -23,7 +23,7 @@ from rich.table import Table
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.camera import mount, placed
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.motion import SHARE, VisualConfig, overlap
 from jaxbiped.sensing.noise import attitude_error
 from jaxbiped.sensing.view import View

@@ -20,8 +20,8 @@ from jaxbiped.mission.strategies import Strategy
 from jaxbiped.statistics.comparison import Comparison, compare, default_pairs
 from jaxbiped.statistics.schema import metric_columns, ordered, validate
 from jaxbiped.study import store
+from jaxbiped.study.batching import metrics_of
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import metrics_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -199,8 +199,8 @@ class Results:
           InputError: a strategy, arena or point that is not there; a strategy whose code is not what it was.
         """
         from jaxbiped.api.play import PlayedMission
-        from jaxbiped.study.again import play_again
         from jaxbiped.study.manifest import Manifest
+        from jaxbiped.study.replay import play_again
 
         where = (pl.col("strategy") == strategy) & (pl.col("arena") == arena) & (pl.col("point") == point)
         if self.rows.filter(where).is_empty():

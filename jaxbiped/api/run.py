@@ -14,9 +14,9 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.study import store
-from jaxbiped.study.conduct import conduct, table
 from jaxbiped.study.evaluate import Progress
 from jaxbiped.study.evaluate import evaluate as evaluate_shards
+from jaxbiped.study.run_study import conduct, table
 from jaxbiped.study.runner import check_mission
 
 

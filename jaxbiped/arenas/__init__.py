@@ -8,7 +8,7 @@ lazy_package(
         "arena": "CIRCLE SQUARE Arena Landmarks",
         "config": "PopulationConfig",
         "families": "FAMILIES KNOWN MOVING sample",
-        "movers": "Movers at_time only",
+        "moving_boxes": "Movers at_time only",
         "population": "Population",
         "scene": "SceneConfig load_scene scene_warnings to_arena",
     },

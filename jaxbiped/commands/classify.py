@@ -15,7 +15,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
 from jaxbiped.formats import cloud as clouds
 from jaxbiped.formats.cloud import Cloud
-from jaxbiped.mapping.upright import FRAMES, Upright, find_upright, set_upright
+from jaxbiped.mapping.gravity import FRAMES, Upright, find_upright, set_upright
 from jaxbiped.terminal import legible
 
 

@@ -15,11 +15,11 @@ from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.report.folder_report import terminal_report, write_report
 from jaxbiped.statistics.comparison import default_pairs
 from jaxbiped.statistics.sequential import Goal
+from jaxbiped.study.batching import groups_of, shards, strategies_of
 from jaxbiped.study.components import fingerprinted
-from jaxbiped.study.conduct import conduct, never
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import groups_of, shards, strategies_of
 from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.run_study import conduct, never
 from jaxbiped.study.runner import check_mission
 from jaxbiped.study.stopping import Rule
 

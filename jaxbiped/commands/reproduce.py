@@ -50,7 +50,7 @@ def main(args: ReproduceArgs) -> int:
     refuse_existing(out)
     arenas = load_scenes(args.scenes, (*(item.scene for item in EXPERIMENTS), *SCENES))
     if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+        from jaxbiped.mission.simulated_driver import rehearse  # loads MuJoCo
 
         rehearse(config)
     console, began = Console(), time.perf_counter()

@@ -19,7 +19,7 @@ from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.statistics import Comparison
 from jaxbiped.statistics.equivalence import equivalences
 from jaxbiped.statistics.sample_size_plan import plan
-from jaxbiped.study.sides import Side, choose, compare_sides, open_stored
+from jaxbiped.study.stored_series import Side, choose, compare_sides, open_stored
 from jaxbiped.terminal import command_line
 
 

@@ -15,11 +15,11 @@ from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.report.folder_report import terminal_report, write_report
+from jaxbiped.study.batching import groups_of, shards, strategies_of
 from jaxbiped.study.components import fingerprinted
-from jaxbiped.study.conduct import conduct
-from jaxbiped.study.groups import groups_of, shards, strategies_of
 from jaxbiped.study.memory import check_memory
 from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.run_study import conduct
 from jaxbiped.study.runner import check_mission
 from jaxbiped.study.sweep import SweepConfig
 

@@ -12,10 +12,10 @@ lazy_package(
         "log": "MissionLog",
         "oracle": "OraclePlan oracle_plan",
         "outcome": "Code",
-        "queue": "Jobs Result Tally compile_queue stack",
+        "batched_driver": "Jobs Result Tally compile_queue stack",
         "settings": "Program Settings program",
         "state": "Mind World start",
-        "stepped": "Mission run_logged",
+        "recorded_driver": "Mission run_logged",
         "strategies": "STRATEGIES Strategy find_strategy",
     },
 )

@@ -10,22 +10,22 @@ import jax.numpy as jnp
 from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.movers import at_time, only
+from jaxbiped.arenas.moving_boxes import at_time, only
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.localisation.kalman_filter import predict
 from jaxbiped.mission.decision import Thought, climbed, decide
-from jaxbiped.mission.encounter import met
 from jaxbiped.mission.execution import Execution, execution_of
-from jaxbiped.mission.footing import walked
+from jaxbiped.mission.foot_placement import walked
 from jaxbiped.mission.localising import carried_on, unmarked
 from jaxbiped.mission.metric import Step, updated
+from jaxbiped.mission.moving_collisions import met
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.sensors import Oracle, RayCast, Standpoint, view_of
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import landmarks
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.view import Sightings, View
 
 SENSE = 1  # channel of a mission's seed

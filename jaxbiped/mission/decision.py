@@ -17,7 +17,7 @@ from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.fading import Eye
-from jaxbiped.mission.footing import place_feet
+from jaxbiped.mission.foot_placement import place_feet
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.localising import localise
 from jaxbiped.mission.outcome import Code

@@ -22,7 +22,7 @@ from jaxbiped.mission.sampled import sampled
 from jaxbiped.mission.settings import Settings
 from jaxbiped.mission.state import World
 from jaxbiped.motion.primitives import Command, duration
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 
 

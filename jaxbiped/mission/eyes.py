@@ -17,7 +17,7 @@ from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.settings import VISUAL, MissionConfig, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.sensing.camera import CameraConfig, Mount, mount, placed
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.noise import attitude_error
 from jaxbiped.sensing.shot import Shot
 from jaxbiped.sensing.view import Sightings, View

@@ -15,7 +15,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import planning
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.movers import only
+from jaxbiped.arenas.moving_boxes import only
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Body, Cell, truth_grid

@@ -9,8 +9,8 @@ from jaxbiped import planning
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.motion.approach import foresight
 from jaxbiped.motion.selection import stride
+from jaxbiped.planning.edge_clearance import rim_costs
 from jaxbiped.planning.planners import Problem
-from jaxbiped.planning.rims import rim_costs
 
 
 def pose_problem(
@@ -27,7 +27,7 @@ def pose_problem(
 ) -> Problem:
     """What the planner of each robot is asked.
 
-    Robots whose feet are placed keep off edges beside their way: `planning.rims` says what that costs.
+    Robots whose feet are placed keep off edges beside their way: `planning.edge_clearance` says what that costs.
 
     Args:
       heading: the direction nearest to `yaw` [rad].

@@ -9,14 +9,14 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
+from jaxbiped.mission.contact_rules import body_touches, edges, feet_touch, off_ground
 from jaxbiped.mission.execution import ODOMETRY, PLAY, Execution
 from jaxbiped.mission.library import PLAYED, Library
-from jaxbiped.mission.referee import body_touches, edges, feet_touch, off_ground
 from jaxbiped.mission.settings import Settings
 from jaxbiped.mission.state import World
 from jaxbiped.motion.primitives import Command, Primitive, duration
-from jaxbiped.sensing import hashing
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing import counter_rng
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 
 STRAIGHT, TURN, UP, DOWN, SQUAT, SIDE = range(len(PLAYED))
@@ -63,7 +63,7 @@ def sampled(arena: Arena, world: World, command: Command, settings: Settings) ->
         height = jnp.where(jnp.abs(ground - height) <= limits.height_tolerance, ground, height)
     after = Pose(after.x, after.y, height, after.yaw)
     stands = stand_probability(library, kind, command.length, jnp.where(command.rise > 0, rises, drops))
-    trips = climbs & (hashing.uniform(seed, 0, 3) >= stands)
+    trips = climbs & (counter_rng.uniform(seed, 0, 3) >= stands)
     slides = off_ground(arena, after, offset, library.rims, limits.height_tolerance)
 
     moves = (turned != 0).any() | (aside != 0).any() | (ahead != 0).any()
@@ -108,10 +108,10 @@ def draw(
     side = jnp.where((kind == TURN) | (kind == SIDE), jnp.sign(size), 1.0) * jnp.array([0.0, 1.0, 1.0])
     mirror = side + jnp.array([1.0, 0.0, 0.0])
     size = jnp.where((kind == UP) | (kind == DOWN), jnp.sign(jnp.abs(size)), jnp.abs(size))
-    noise = library.root[kind] @ hashing.normal(seed, np.arange(3))
+    noise = library.root[kind] @ counter_rng.normal(seed, np.arange(3))
     error = mirror * (size * library.bias[kind] + jnp.sqrt(size) * noise)
     falls = 1.0 - (1.0 - library.falls[kind]) ** size
-    return jnp.where(size > 0, asked + error, 0.0), hashing.uniform(seed, 3) < falls
+    return jnp.where(size > 0, asked + error, 0.0), counter_rng.uniform(seed, 3) < falls
 
 
 def stand_probability(

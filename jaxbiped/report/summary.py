@@ -20,7 +20,7 @@ from jaxbiped.report.tables import markdown_sheets, to_markdown
 from jaxbiped.report.words import number
 from jaxbiped.statistics import QUESTION, Comparison, compare, sample_size
 from jaxbiped.study import Manifest, read, read_points
-from jaxbiped.study.again import Origin
+from jaxbiped.study.replay import Origin
 
 SUMMARY = "summary.md"
 QUESTION_TEXT = "When, and by how much, does bump-aware planning beat floor-only planning?"

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxbiped.biped.catalogue import PAPER
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.stepped import NAMES, Mission
+from jaxbiped.mission.recorded_driver import NAMES, Mission
 from jaxbiped.motion.primitives import CELL, EIGHTH, DurationConfig, Primitive
 from jaxbiped.reproduction.paper import Experiment
 

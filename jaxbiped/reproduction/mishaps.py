@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from jaxbiped.arenas import Arena, SceneConfig, to_arena
 from jaxbiped.mission.eyes import Eyes
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.stepped import Mission
 from jaxbiped.reproduction.staging import play, play_changing
 
 START, GOAL = (0.375, 0.675, 0.0), (1.375, 0.675)  # [m, m, rad], [m]

@@ -13,7 +13,7 @@ from PIL import Image
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.errors import InputError
 from jaxbiped.mission.log import MissionLog
-from jaxbiped.mission.stepped import NAMES
+from jaxbiped.mission.recorded_driver import NAMES
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.report.plots import Plot
 from jaxbiped.reproduction.paper import EXPERIMENTS, Experiment

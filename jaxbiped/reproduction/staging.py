@@ -12,9 +12,9 @@ from jaxbiped.arenas import Arena, load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.recorded_driver import Mission, Recorder, turn_once
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
-from jaxbiped.mission.stepped import Mission, Recorder, turn_once
 from jaxbiped.study.runner import noise_of, play_one
 
 

@@ -10,8 +10,8 @@ from jaxtyping import Bool, Int
 
 from jaxbiped.arenas import Arena
 from jaxbiped.mapping import Cell, truth_grid
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.stepped import Mission
 
 SCENES = {  # scene: the classes that its only way leads over, or round
     "table_1_floor": (Cell.FLOOR,),

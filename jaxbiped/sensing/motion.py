@@ -15,7 +15,7 @@ from jaxtyping import Array, Float, UInt32
 
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
-from jaxbiped.sensing import hashing
+from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
 from jaxbiped.sensing.config import VisualConfig as VisualConfig
 from jaxbiped.sensing.view import Motion, View
@@ -69,8 +69,8 @@ def track(
     share = overlap(view, pose, before, at, camera, image, max_range)
     shrink = jnp.sqrt(SHARE / jnp.maximum(share, LEAST_SHARE))
     sd = jnp.stack([noise.forward, noise.left, noise.yaw]) * shrink
-    error = sd * hashing.normal(seed, np.arange(3), VISUAL)
-    lucky = hashing.uniform(seed, 3, VISUAL) >= noise.failure
+    error = sd * counter_rng.normal(seed, np.arange(3), VISUAL)
+    lucky = counter_rng.uniform(seed, 3, VISUAL) >= noise.failure
     x, y = to_robot(before, pose.x, pose.y)
     yaw = wrap_angle(pose.yaw - before.yaw)
     seen = (share >= noise.least_share) & lucky & jnp.isfinite(x + y + yaw)

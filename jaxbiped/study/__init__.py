@@ -5,7 +5,7 @@ from jaxbiped.core.lazy_package import lazy_package
 lazy_package(
     __name__,
     {
-        "sides": "Side Stored choose compare_sides open_stored",
+        "stored_series": "Side Stored choose compare_sides open_stored",
         "store": "Manifest Store StoredRows create read read_manifest read_points scan",
     },
 )

@@ -33,11 +33,11 @@ from jaxbiped.core.registry import PLACE
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
-from jaxbiped.mission.queue import Tally
+from jaxbiped.mission.batched_driver import Tally
 from jaxbiped.study import evaluate, worker
+from jaxbiped.study.batching import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress
-from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.worker import Compute
 
 ANSWER = 5.0  # [s] for the scheduler to answer

@@ -19,12 +19,12 @@ from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.core.sizes import ARENAS, POINTS, fill_up, filled
 from jaxbiped.devices import by_rows, cores, mesh_of
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import OnProgress, Tally
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
-from jaxbiped.mission.queue import OnProgress, Tally
-from jaxbiped.sensing.hashing import from_key
+from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.schema import SCHEMA
+from jaxbiped.study.batching import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.metric_columns import check_metrics, metric_columns
 from jaxbiped.study.rows import frame
 from jaxbiped.study.runner import batch_driver

@@ -14,12 +14,12 @@ from jaxtyping import Array, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, ending, no_results
 from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import OnProgress, Result, Tally, ending, no_results
+from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.camera import CameraConfig
 
 

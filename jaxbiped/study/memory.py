@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 
 from jaxbiped.errors import InputError
-from jaxbiped.mission.queue import SLOTS
+from jaxbiped.mission.batched_driver import SLOTS
 from jaxbiped.mission.settings import Program
 
 # Bytes, measured as growth of the resident memory, and rounded up.

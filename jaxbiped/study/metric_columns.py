@@ -12,11 +12,11 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.core.sizes import POINTS, fill, filled
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import Result, no_results
 from jaxbiped.mission.metric import MissionEnd, begun, numbers_at_end
 from jaxbiped.mission.oracle import OraclePlan
-from jaxbiped.mission.queue import Result, no_results
 from jaxbiped.mission.settings import Settings
-from jaxbiped.study.groups import Group
+from jaxbiped.study.batching import Group
 
 
 @with_own_settings

@@ -15,7 +15,7 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.sizes import ARENAS, JOBS, POINTS, fill_up, filled
 from jaxbiped.devices import cores, mesh_of
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
+from jaxbiped.mission.batched_driver import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
 from jaxbiped.mission.settings import Program, Settings
 
 

@@ -14,14 +14,14 @@ from jaxtyping import Array, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.component import traced_component, with_numbers
 from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.mission.batched_driver import Result
 from jaxbiped.mission.eyes import Eyes, eyes_for
 from jaxbiped.mission.program_for import program_for
-from jaxbiped.mission.queue import Result
+from jaxbiped.mission.recorded_driver import Mission, Played, run_logged
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
-from jaxbiped.mission.stepped import Mission, Played, run_logged
 from jaxbiped.mission.strategies import Strategy, find_strategy
-from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.groups import Group, numbers_under
+from jaxbiped.sensing.counter_rng import from_key
+from jaxbiped.study.batching import Group, numbers_under
 
 
 def noise_of(seed: int) -> UInt32[Array, ""]:
@@ -47,7 +47,7 @@ def check_mission(config: MissionConfig) -> None:
       InputError: a biped that cannot play its primitives, a device or a renderer that is not there.
     """
     if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+        from jaxbiped.mission.simulated_driver import rehearse  # loads MuJoCo
 
         rehearse(config)
 
@@ -85,7 +85,7 @@ def play_one(
     settings = numbered(config.settings(strategy), strategy, numbers or {})
     arguments = arena, settings, noise, program_of(config, arena)
     if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import walk_logged  # loads MuJoCo
+        from jaxbiped.mission.simulated_driver import walk_logged  # loads MuJoCo
 
         return walk_logged(*arguments, config=config.walk, on_decision=on_decision, eyes=eyes)
     return run_logged(*arguments, on_decision=on_decision, eyes=eyes)

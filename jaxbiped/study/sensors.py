@@ -21,9 +21,9 @@ from jaxbiped.mapping.truth import truth_grid
 from jaxbiped.mission.cycle import sense
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.settings import MissionConfig, Program, Settings, program
 from jaxbiped.mission.state import Mind, World, start
-from jaxbiped.mission.stepped import run_bare
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.view import View
 from jaxbiped.study.evaluate import draw

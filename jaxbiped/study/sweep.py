@@ -20,7 +20,7 @@ from jaxbiped.study.axes import Axis, Sobol, told
 from jaxbiped.study.config import OF_COMPONENTS, StudyConfig
 
 if TYPE_CHECKING:
-    from jaxbiped.study.groups import Point
+    from jaxbiped.study.batching import Point
 
 POPULATION = "population"
 OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # numbers that may be left out
@@ -125,7 +125,7 @@ def point_at(
       size_xy: [m] of all arenas, which its pitch must divide; None: that is looked at when they are known.
     """
     from jaxbiped.mission.settings import program
-    from jaxbiped.study.groups import Point
+    from jaxbiped.study.batching import Point
 
     own = {}
     for name, value in values.items():

@@ -17,8 +17,8 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.devices import cores
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.settings import MissionConfig, Settings, program
 from jaxbiped.planning import Costs
 from jaxbiped.study.evaluate import draw

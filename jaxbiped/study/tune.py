@@ -10,8 +10,8 @@ import optax
 import polars as pl
 from jaxtyping import Float, Int
 
+from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import OnProgress, Result, Tally, tally
 from jaxbiped.mission.settings import CostConfig, MissionConfig
 from jaxbiped.statistics.intervals import Estimate, mean_and_median
 from jaxbiped.statistics.paired import PairedMetric, metric_difference, success_difference

@@ -11,9 +11,9 @@ import polars as pl
 
 from jaxbiped.errors import InputError
 from jaxbiped.mission.recording import FILE
-from jaxbiped.study.again import mission_of, play_again
 from jaxbiped.study.manifest import MANIFEST
-from jaxbiped.study.sides import Side, Stored, check, open_stored, present
+from jaxbiped.study.replay import mission_of, play_again
+from jaxbiped.study.stored_series import Side, Stored, check, open_stored, present
 from jaxbiped.viewer.shown import Shown, ending, shown
 
 FAILURES = 40  # of a strategy that are listed; any other can be asked for by its number

@@ -13,9 +13,9 @@ from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import generate
 from jaxbiped.biped.request import Request
 from jaxbiped.errors import InputError
-from jaxbiped.mission.footwork import Move, requests
 from jaxbiped.mission.log import MissionLog
-from jaxbiped.mission.stepped import NAMES
+from jaxbiped.mission.primitive_schedule import Move, requests
+from jaxbiped.mission.recorded_driver import NAMES
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.viewer.puppet import Puppet
 

@@ -14,7 +14,7 @@ from jaxbiped.commands import compare, fit_sensor, plan, reproduce, run, scenari
 from jaxbiped.commands.plan import Plan
 from jaxbiped.formats.moving_ai import load_map, load_scenario
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.stepped import Mission
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.reproduction import EXPERIMENTS
 from jaxbiped.reproduction.findings import Findings
 from jaxbiped.reproduction.mishaps import MISHAPS, Ending
@@ -25,7 +25,7 @@ from tests.commands.test_classify import ROOM
 from tests.commands.test_stereo import CAMERA
 from tests.report.test_pictures import mission
 from tests.reproduction.test_reproduction_page import a_log, a_record
-from tests.study.test_sides import stored
+from tests.study.test_stored_series import stored
 
 DATA = Path(__file__).parent.parent / "data"
 ROOMS, SCEN = DATA / "rooms.map", DATA / "rooms.map.scen"

@@ -11,7 +11,7 @@ import pytest
 from jaxbiped import cli
 from jaxbiped.commands import view
 from jaxbiped.mission.recording import save_log
-from tests.study.test_sides import stored
+from tests.study.test_stored_series import stored
 from tests.viewer.test_viewer import seen
 
 pytest.importorskip("viser")

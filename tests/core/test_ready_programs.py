@@ -212,21 +212,21 @@ def test_replacing_anything_in_a_module_is_seen():
     code = """
 import jaxbiped as jb
 from jaxbiped.core.lazy_package import REPLACED
-from jaxbiped.mission import queue
+from jaxbiped.mission import batched_driver
 import jaxbiped.planning.field, jaxbiped.study.evaluate, jaxbiped.arenas.families, jaxbiped.formats.elevation
 jb.play, jb.Study, jb.planning.field, jb.mapping.update
 print(sorted(REPLACED))
-queue.TURNS = 4
+batched_driver.TURNS = 4
 jaxbiped.arenas.families.MAX_BOXES = 3
 print(sorted(REPLACED))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n['jaxbiped.arenas.families.MAX_BOXES', 'jaxbiped.mission.queue.TURNS']\n"
+    assert done.stdout == "[]\n['jaxbiped.arenas.families.MAX_BOXES', 'jaxbiped.mission.batched_driver.TURNS']\n"
 
 
 PATCHED = """
 import jaxbiped as jb
-import jaxbiped.study.evaluate, jaxbiped.api.results, jaxbiped.report.page, jaxbiped.mission.walking
+import jaxbiped.study.evaluate, jaxbiped.api.results, jaxbiped.report.page, jaxbiped.mission.simulated_driver
 from jaxbiped.core import program_key
 print(program_key.has_foreign_methods(), sorted(program_key.REPLACED))
 def blind(self, *_):

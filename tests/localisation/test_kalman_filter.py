@@ -8,7 +8,7 @@ from scipy import stats
 from jaxbiped.arenas.arena import Landmarks
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation import Belief, correct, known, predict
-from jaxbiped.sensing import OdometryConfig, Sightings, drift, hashing
+from jaxbiped.sensing import OdometryConfig, Sightings, counter_rng, drift
 from tests.reference import sensing as reference
 from tests.sensing.scenes import as_numpy
 
@@ -32,7 +32,7 @@ def look(pose, seed, seen, sd=SD):
     """Sightings from a true pose."""
     c, s = jnp.cos(pose[2]), jnp.sin(pose[2])
     dx, dy = LANDMARKS.x - pose[0], LANDMARKS.y - pose[1]
-    error = sd * hashing.normal(seed, np.arange(10), 9).reshape(2, 5)
+    error = sd * counter_rng.normal(seed, np.arange(10), 9).reshape(2, 5)
     return Sightings(c * dx + s * dy + error[0], -s * dx + c * dy + error[1], jnp.full(5, sd), seen)
 
 
@@ -41,12 +41,12 @@ def walk(seed, steps=30):
 
     def step(state, k):
         true, belief = state
-        now = hashing.fold(seed, k)
+        now = counter_rng.fold(seed, k)
         asked = (jnp.float32(0.05), jnp.float32(0), jnp.float32(0.2))
         moved, variances = drift(asked, NOISE, now)
         true = truth_step(true, jnp.stack(moved))
         belief = predict(belief, *asked, variances)
-        sightings = look(true, now, hashing.uniform(now, np.arange(5), 8) < 1 / 3)
+        sightings = look(true, now, counter_rng.uniform(now, np.arange(5), 8) < 1 / 3)
         belief = correct(belief, LANDMARKS, sightings)
         pose = belief.pose
         error = jnp.stack([pose.x, pose.y, pose.yaw]) - true
@@ -55,7 +55,7 @@ def walk(seed, steps=30):
 
     start = known(Pose(*jnp.array([0.8, 0.5, 0.03, 0.0])))
     start = Belief(start.pose, jnp.diag(jnp.array([1e-4, 1e-4, 1e-3])))
-    spread = jnp.sqrt(jnp.diag(start.cov)) * hashing.normal(seed, np.arange(3), 10)
+    spread = jnp.sqrt(jnp.diag(start.cov)) * counter_rng.normal(seed, np.arange(3), 10)
     return jax.lax.scan(step, (jnp.array([0.8, 0.5, 0.0]) + spread, start), jnp.arange(steps))[1]
 
 

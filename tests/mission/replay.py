@@ -19,7 +19,7 @@ from jaxbiped.mapping.gridmap import GridMap
 from jaxbiped.mapping.relief import FACE, Surfaces
 from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.state import World
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.view import View
 from tests.reference import mapping, sensing
 

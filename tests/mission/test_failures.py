@@ -10,13 +10,13 @@ import pytest
 from jaxbiped.arenas.scene import SceneConfig, to_arena
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.cycle import conclude
 from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import stack
 from jaxbiped.mission.state import Planned, World, start
 from jaxbiped.motion.primitives import Command, Primitive
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from tests.mission.conftest import CONFIG, PROGRAM, play, row
 from tests.reference import motion as plain
 

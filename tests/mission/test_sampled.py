@@ -10,14 +10,14 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from jaxbiped.arenas.scene import load_scene
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.library import PLAYED, load_library
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import stack
+from jaxbiped.mission.recorded_driver import run_logged
 from jaxbiped.mission.sampled import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
-from jaxbiped.mission.stepped import run_logged
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing.odometry import OdometryConfig
 from jaxbiped.study.queues import run_all

@@ -8,7 +8,7 @@ import pytest
 from jaxbiped.biped import request as ask
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes
-from jaxbiped.mission.footwork import WalkConfig, targets
+from jaxbiped.mission.primitive_schedule import WalkConfig, targets
 from jaxbiped.mission.stage import Stage, nearest
 
 ROBOT = WalkConfig().biped

@@ -23,7 +23,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.motion.selection import stride
 from jaxbiped.planning import DIRECTIONS
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from tests.reference import mapping, motion, planning, sensing
 
 f32 = np.float32

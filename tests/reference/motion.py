@@ -13,7 +13,7 @@ from jaxbiped.motion.edge import WINDOW
 from jaxbiped.motion.primitives import CELL, EIGHTH, Primitive
 from jaxbiped.motion.selection import SHORTEST, TURN_DEADBAND
 from jaxbiped.planning import DIRECTIONS
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from tests.reference import sensing
 
 

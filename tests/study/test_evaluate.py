@@ -10,8 +10,8 @@ import pytest
 
 from jaxbiped.arenas.families import FAMILIES
 from jaxbiped.arenas.population import PopulationConfig
-from jaxbiped.mission import queue
-from jaxbiped.mission.queue import stack
+from jaxbiped.mission import batched_driver
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.statistics.schema import validate
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import draw, evaluate
@@ -36,11 +36,11 @@ def compiled():
 def swept():
     """64 cost vectors: their rows, programs compiled for their queue, and compilations after the first shard."""
     points, frames, after = list(COSTS.points()), [], []
-    programs = len(queue.COMPILED)
+    programs = len(batched_driver.COMPILED)
     for _, frame in evaluate(COSTS, points=points):
         frames.append(frame)
         after.append(len(compiled()))
-    return pl.concat(frames), len(queue.COMPILED) - programs, after[-1] - after[0]
+    return pl.concat(frames), len(batched_driver.COMPILED) - programs, after[-1] - after[0]
 
 
 def test_64_cost_vectors_compile_one_program(swept):
@@ -82,9 +82,9 @@ def test_every_column_of_every_row_is_the_same_in_any_batch():
 def test_two_pitches_compile_twice():
     axes = ({"field": "pitch", "values": (0.1, 0.05)}, {"field": "costs.c3", "values": (5, 10)})
     config = SweepConfig(**SMALL | {"arenas": 1}, axes=axes, mission=MISSION)
-    programs = len(queue.COMPILED)
+    programs = len(batched_driver.COMPILED)
     shards = [shard for shard, _ in evaluate(config, points=list(config.points()))]
-    assert len(queue.COMPILED) - programs == 2 and [shard.group for shard in shards] == [0, 1]
+    assert len(batched_driver.COMPILED) - programs == 2 and [shard.group for shard in shards] == [0, 1]
 
 
 def test_populations_change_what_they_name_alone():

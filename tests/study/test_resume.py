@@ -17,9 +17,9 @@ from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.study import store
-from jaxbiped.study.conduct import conduct
 from jaxbiped.study.lock import FolderLock
 from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.run_study import conduct
 from tests.study.engine import CONFIG, TABLE, engine
 
 conduct_here = partial(conduct, config=CONFIG, engine=engine)

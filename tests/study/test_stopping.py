@@ -10,9 +10,9 @@ from jaxbiped.report.folder_report import write_report
 from jaxbiped.report.stopping import stopping_sentences
 from jaxbiped.statistics.sequential import Goal
 from jaxbiped.study import store
-from jaxbiped.study.conduct import conduct
+from jaxbiped.study.batching import shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import shards
+from jaxbiped.study.run_study import conduct
 from jaxbiped.study.stopping import STOPPING, Rule, read_stopping
 from tests.study.synthetic import rows
 

@@ -12,9 +12,9 @@ from jaxbiped.config import parse
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.study import memory
-from jaxbiped.study.conduct import table
-from jaxbiped.study.groups import group_points, shards
+from jaxbiped.study.batching import group_points, shards
 from jaxbiped.study.memory import check_memory
+from jaxbiped.study.run_study import table
 from jaxbiped.study.sweep import SweepConfig
 
 STRATEGIES = ("full", "floor_only")

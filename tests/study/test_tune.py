@@ -7,8 +7,8 @@ import polars as pl
 import pydantic
 import pytest
 
+from jaxbiped.mission.batched_driver import Result, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Result, tally
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import Planned
 from jaxbiped.study.search import sobol

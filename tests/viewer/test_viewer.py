@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from jaxbiped.arenas.movers import Movers, boxes_at
+from jaxbiped.arenas.moving_boxes import Movers, boxes_at
 from jaxbiped.arenas.scene import BoxConfig, SceneConfig, to_arena
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import Walk
-from jaxbiped.mission.moments import outlines
 from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.snapshots import outlines
 from jaxbiped.report.pictures import COLOURS
 from jaxbiped.viewer import layers, solids
 from jaxbiped.viewer.canvas import FIELD_OF_VIEW, viewpoint

@@ -5,14 +5,14 @@ import pytest
 
 from jaxbiped.errors import InputError
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.recording import save_log
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.stepped import Mission
 from jaxbiped.viewer import missions as room
 from jaxbiped.viewer.missions import Files, Study, choices, missions
 from jaxbiped.viewer.server import serving
 from tests.study.synthetic import rows
-from tests.study.test_sides import stored
+from tests.study.test_stored_series import stored
 from tests.viewer.test_viewer import seen
 
 

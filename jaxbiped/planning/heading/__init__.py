@@ -5,7 +5,7 @@ from jaxbiped.core.lazy_package import lazy_package
 lazy_package(
     __name__,
     {
-        "crossing": "crossing_faces",
+        "edge_direction": "crossing_faces",
         "field": "HeadingField heading_field",
         "path": "heading_path path_time",
         "times": "Moves Times heading_moves",

@@ -5,7 +5,7 @@ from jaxbiped.core.lazy_package import lazy_package
 lazy_package(
     __name__,
     {
-        "crossing": "crossing_faces",
+        "edge_direction": "crossing_faces",
         "heading": "solve_headings",
         "names": "LANES METHODS",
         "solvers": "aligned solve_arrays solve_edges solve_grids",

@@ -16,7 +16,7 @@ DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 
 
 @njit(nogil=True)
-def settle(edges, goals, cost, arena, height, width, batch, half):
+def solve_arena(edges, goals, cost, arena, height, width, batch, half):
     """Settle arena number `arena`; arrays as in `line_sweep`, where `cost` is 0 at the goal and inf elsewhere."""
     line = width + 2
     offsets = np.array([DI[k] * line + DJ[k] for k in range(8)])

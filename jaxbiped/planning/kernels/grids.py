@@ -9,9 +9,9 @@ from numba import carray, njit
 
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import FORBIDDEN
-from jaxbiped.planning.kernels import foreign, line_sweep
+from jaxbiped.planning.kernels import line_sweep, xla_ffi
 from jaxbiped.planning.kernels.line_sweep import LANES
-from jaxbiped.planning.kernels.vector import pricing, translation, transposition
+from jaxbiped.planning.kernels.vector_ops import pricing, translation, transposition
 
 KINDS = FORBIDDEN + 1  # of moves
 CLASSES = len(Cell)
@@ -60,7 +60,7 @@ def turning(lanes: int):
 
 
 def layout(batch: int, height: int, width: int) -> tuple[tuple[tuple[int, ...], type], ...]:
-    """Shape and dtype of each argument of `settle_all`: classes, levels, kinds_of, prices, cutting, goals."""
+    """Shape and dtype of each argument of `solve_all`: classes, levels, kinds_of, prices, cutting, goals."""
     return (
         ((batch, height, width), np.int8),
         ((batch, height, width), np.int8),
@@ -72,10 +72,10 @@ def layout(batch: int, height: int, width: int) -> tuple[tuple[tuple[int, ...], 
 
 
 @cache
-def settler(sweeps=line_sweep.sweeps):
-    """The function `settle_all`, `LANES` arenas at a time, which adds up costs as float64.
+def make_solver(sweeps=line_sweep.sweeps):
+    """The function `solve_all`, `LANES` arenas at a time, which adds up costs as float64.
 
-    `settle_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, settled, cost, room, bytes, height,
+    `solve_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, settled, cost, room, bytes, height,
     width)`, all flat arrays but goals. Given for B >= LANES arenas: classes and levels of cells, int8 [B, H, W]; the
     kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and oblique, float32 [B, 2,
     KINDS]; whether corners may be cut, int8 [B]; goals int32 [B, 2]. Written: the cost to go, float32 [B, H, W];
@@ -86,13 +86,13 @@ def settler(sweeps=line_sweep.sweeps):
       sweeps: of `LANES`, the function that settles.
     """
     lanes = LANES
-    settle, unsettled = sweeps(lanes), line_sweep.proof(lanes)
+    solve_lanes, unsettled = sweeps(lanes), line_sweep.proof(lanes)
     spread, gather = turning(lanes)
     kind_of = translation(lanes, CLASSES, Cell.OBSTACLE)
     straight, oblique = pricing(lanes, oblique=False), pricing(lanes, oblique=True)
 
     @njit(nogil=True)
-    def settle_all(
+    def solve_all(
         classes, levels, kinds_of, prices, cutting, goals, field, steps, settled, cost, room, bytes, height, width
     ):
         line, size = (width + 2) * lanes, room_size(height, width)
@@ -128,7 +128,7 @@ def settler(sweeps=line_sweep.sweeps):
                 i, j = goals[first + lane]
                 if 0 <= i < height and 0 <= j < width:
                     cost[(i + 1) * line + (j + 1) * lanes + lane] = 0.0
-            steps[first : first + lanes] = settle(
+            steps[first : first + lanes] = solve_lanes(
                 edges + edges, goals[first : first + lanes], cost, 0, height, width, lanes, True
             )
             gather(cost, field, first, height, width)
@@ -136,7 +136,7 @@ def settler(sweeps=line_sweep.sweeps):
             for lane in range(lanes):
                 settled[first + lane] = (wrong >> np.uint64(lane)) & np.uint64(1) == 0
 
-    return settle_all
+    return solve_all
 
 
 @njit(nogil=True)
@@ -146,27 +146,27 @@ def room_size(height, width):
 
 
 def solver():
-    """`settle_all` as `foreign.register` wants it: the first six arrays are arguments, the other six results."""
-    settle_all = settler()
+    """`solve_all` as `xla_ffi.register` wants it: the first six arrays are arguments, the other six results."""
+    solve_all = make_solver()
 
     @njit
     def solve(arguments, count, results):
-        dims = foreign.shape(results, 0)
+        dims = xla_ffi.shape(results, 0)
         batch, height, width = np.int64(dims[0]), np.int64(dims[1]), np.int64(dims[2])
         cells, size = batch * height * width, room_size(height, width)
-        settle_all(
-            foreign.array(arguments, 0, cells, np.int8),
-            foreign.array(arguments, 1, cells, np.int8),
-            foreign.array(arguments, 2, batch * CLASSES, np.int8),
-            foreign.array(arguments, 3, batch * 2 * KINDS, np.float32),
-            foreign.array(arguments, 4, batch, np.int8),
-            carray(foreign.pointer(foreign.data(arguments, 5)), (batch, 2), np.int32),
-            foreign.array(results, 0, cells, np.float32),
-            foreign.array(results, 1, batch, np.int32),
-            foreign.array(results, 2, batch, np.bool_),
-            foreign.array(results, 3, size, np.float64),
-            foreign.array(results, 4, 4 * size, np.float32),
-            foreign.array(results, 5, 3 * size, np.int8),
+        solve_all(
+            xla_ffi.array(arguments, 0, cells, np.int8),
+            xla_ffi.array(arguments, 1, cells, np.int8),
+            xla_ffi.array(arguments, 2, batch * CLASSES, np.int8),
+            xla_ffi.array(arguments, 3, batch * 2 * KINDS, np.float32),
+            xla_ffi.array(arguments, 4, batch, np.int8),
+            carray(xla_ffi.pointer(xla_ffi.data(arguments, 5)), (batch, 2), np.int32),
+            xla_ffi.array(results, 0, cells, np.float32),
+            xla_ffi.array(results, 1, batch, np.int32),
+            xla_ffi.array(results, 2, batch, np.bool_),
+            xla_ffi.array(results, 3, size, np.float64),
+            xla_ffi.array(results, 4, 4 * size, np.float32),
+            xla_ffi.array(results, 5, 3 * size, np.int8),
             height,
             width,
         )

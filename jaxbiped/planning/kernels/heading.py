@@ -13,8 +13,8 @@ from numba import carray, njit
 
 from jaxbiped.core.ready_programs import TARGETS
 from jaxbiped.planning.costs import DIRECTIONS
-from jaxbiped.planning.kernels import foreign
 from jaxbiped.planning.kernels import heading_sweep as sweep
+from jaxbiped.planning.kernels import xla_ffi
 
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 LOCK = Lock()
@@ -22,7 +22,7 @@ LOCK = Lock()
 
 @njit(nogil=True)
 def is_settled(time, face, turn, height, width, cost):
-    """Whether no state can be lowered by any of the moves and turns out of it; arguments as of `settle`."""
+    """Whether no state can be lowered by any of the moves and turns out of it; arguments as of `solve_arena`."""
     cells = height * width
     for state in range(8 * cells):
         h, n = state // cells, state % cells
@@ -38,7 +38,7 @@ def is_settled(time, face, turn, height, width, cost):
 
 
 @njit(nogil=True)
-def settle(time, face, turn, goal_i, goal_j, height, width, cost):
+def solve_arena(time, face, turn, goal_i, goal_j, height, width, cost):
     """One arena: `time` and `face` [8 * H * W] flat; `cost` [8 * H * W] is written. Returns whether it is settled."""
     cells = height * width
     cost[:] = np.inf
@@ -71,20 +71,20 @@ def settle(time, face, turn, goal_i, goal_j, height, width, cost):
 
 @njit(nogil=True)
 def solve(arguments, count, results):
-    """All arenas, as `foreign.register` wants it."""
-    dims = foreign.shape(arguments, 0)
+    """All arenas, as `xla_ffi.register` wants it."""
+    dims = xla_ffi.shape(arguments, 0)
     batch, height, width = np.int64(dims[0]), np.int64(dims[2]), np.int64(dims[3])
     size = 8 * height * width
-    time = foreign.array(arguments, 0, batch * size, np.float32)
-    face = foreign.array(arguments, 1, batch * size, np.int8)
-    turn = foreign.array(arguments, 2, batch, np.float32)
-    goals = carray(foreign.pointer(foreign.data(arguments, 3)), (batch, 2), np.int32)
-    field = foreign.array(results, 0, batch * size, np.float32)
-    settled = foreign.array(results, 1, batch, np.bool_)
+    time = xla_ffi.array(arguments, 0, batch * size, np.float32)
+    face = xla_ffi.array(arguments, 1, batch * size, np.int8)
+    turn = xla_ffi.array(arguments, 2, batch, np.float32)
+    goals = carray(xla_ffi.pointer(xla_ffi.data(arguments, 3)), (batch, 2), np.int32)
+    field = xla_ffi.array(results, 0, batch * size, np.float32)
+    settled = xla_ffi.array(results, 1, batch, np.bool_)
     cost = np.empty(size)
     for arena in range(batch):
         part, (i, j) = slice(arena * size, (arena + 1) * size), goals[arena]
-        settled[arena] = settle(time[part], face[part], float(turn[arena]), i, j, height, width, cost)
+        settled[arena] = solve_arena(time[part], face[part], float(turn[arena]), i, j, height, width, cost)
         field[part] = cost
 
 
@@ -93,7 +93,7 @@ def registered(method: str) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
     name = f"jaxbiped_heading_{method}"
     TARGETS[name] = __name__, (method,)
-    foreign.register(name, solve if method == "dijkstra" else sweep.solver(), keep=True)
+    xla_ffi.register(name, solve if method == "dijkstra" else sweep.solver(), keep=True)
     return name, 1 if method == "dijkstra" else sweep.LANES
 
 
@@ -115,7 +115,7 @@ def solve_headings(time, face, turn, goal_ij, method: str):
     inputs = time, face, turn, goal_ij
     layout = ((time.shape, np.float32), (time.shape, np.int8), ((batch,), np.float32), ((batch, 2), np.int32))
     for array, (shape, dtype) in zip(inputs, layout, strict=True):
-        foreign.expect(array, shape, dtype)
+        xla_ffi.expect(array, shape, dtype)
     if batch < lanes:
         # of no moves: there is nothing to sweep in the lanes that are added
         inputs = [

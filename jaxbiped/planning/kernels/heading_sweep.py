@@ -13,16 +13,16 @@ import numpy as np
 from numba import carray, njit
 
 from jaxbiped.planning.costs import DIRECTIONS
-from jaxbiped.planning.kernels import foreign
-from jaxbiped.planning.kernels.vector import relaxation
+from jaxbiped.planning.kernels import xla_ffi
+from jaxbiped.planning.kernels.vector_ops import relaxation
 
 LANES = 8  # arenas a vector
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 
 
 @cache
-def settler(rounds: int = 0):
-    """A function `settle(time, face, turn, goals, field, settled, first, height, width)` of arenas `first` and on.
+def make_solver(rounds: int = 0):
+    """A function `solve_lanes(time, face, turn, goals, field, settled, first, height, width)` of arenas `first` and on.
 
     `time`, `face` and `field` are [B * 8 * H * W] flat. Room of its own has the arenas last and a ring of inf:
     [8 * (H + 2) * (W + 2) * LANES]. Sums are float64. `settled` [B]: whether one more relaxation of every state lowers
@@ -35,7 +35,7 @@ def settler(rounds: int = 0):
     relax = relaxation(lanes)
 
     @njit(nogil=True)
-    def settle(time, face, turns, goals, field, settled, first, height, width):
+    def solve_lanes(time, face, turns, goals, field, settled, first, height, width):
         cells, line = height * width, (width + 2) * lanes
         plane = (height + 2) * line
         cost, own = np.full(8 * plane, np.inf), np.full(8 * plane, np.inf, np.float32)
@@ -125,26 +125,26 @@ def settler(rounds: int = 0):
         for lane in range(lanes):
             settled[first + lane] = (less >> np.uint64(lane)) & np.uint64(1) == 0
 
-    return settle
+    return solve_lanes
 
 
 def solver():
-    """`settle` for all arenas of a batch, no fewer than `LANES`, as `foreign.register` wants it."""
-    settle = settler()
+    """`solve_lanes` for all arenas of a batch, no fewer than `LANES`, as `xla_ffi.register` wants it."""
+    solve_lanes = make_solver()
 
     @njit
     def solve(arguments, count, results):
-        dims = foreign.shape(arguments, 0)
+        dims = xla_ffi.shape(arguments, 0)
         batch, height, width = np.int64(dims[0]), np.int64(dims[2]), np.int64(dims[3])
         size = batch * 8 * height * width
-        time = foreign.array(arguments, 0, size, np.float32)
-        face = foreign.array(arguments, 1, size, np.int8)
-        turn = foreign.array(arguments, 2, batch, np.float32)
-        goals = carray(foreign.pointer(foreign.data(arguments, 3)), (batch, 2), np.int32)
-        field = foreign.array(results, 0, size, np.float32)
-        settled = foreign.array(results, 1, batch, np.bool_)
+        time = xla_ffi.array(arguments, 0, size, np.float32)
+        face = xla_ffi.array(arguments, 1, size, np.int8)
+        turn = xla_ffi.array(arguments, 2, batch, np.float32)
+        goals = carray(xla_ffi.pointer(xla_ffi.data(arguments, 3)), (batch, 2), np.int32)
+        field = xla_ffi.array(results, 0, size, np.float32)
+        settled = xla_ffi.array(results, 1, batch, np.bool_)
         for start in range(0, batch, LANES):
             # the last arenas overlap those before
-            settle(time, face, turn, goals, field, settled, min(start, batch - LANES), height, width)
+            solve_lanes(time, face, turn, goals, field, settled, min(start, batch - LANES), height, width)
 
     return solve

@@ -12,14 +12,14 @@ from numba import njit
 
 from jaxbiped.planning.costs import DIRECTIONS
 from jaxbiped.planning.kernels.names import LANES as LANES
-from jaxbiped.planning.kernels.vector import relaxation
+from jaxbiped.planning.kernels.vector_ops import relaxation
 
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 LEFT = DJ[:4]  # columns that the first four directions go
 
 
 def sweeps(lanes: int):
-    """A function `settle(edges, goals, cost, first, height, width, batch, half) -> steps` for so many arenas a vector.
+    """A function `solve_lanes(edges, goals, cost, first, height, width, batch, half) -> steps`, so many arenas a vector.
 
     Relaxes arenas `first` to `first + lanes - 1` until nothing changes: passes down, up, down, ... Each row relaxes
     from the row before and along itself, rightwards and then leftwards, so that a path which never turns back settles
@@ -31,7 +31,7 @@ def sweeps(lanes: int):
     relax = relaxation(lanes)
 
     @njit(nogil=True)
-    def settle(edges, goals, cost, first, height, width, batch, half):
+    def solve_lanes(edges, goals, cost, first, height, width, batch, half):
         line = (width + 2) * batch
         ahead, right, middle, left = edges[0], edges[1], edges[2], edges[3]
         back, back_right, back_middle, back_left = edges[4], edges[5], edges[6], edges[7]
@@ -81,7 +81,7 @@ def sweeps(lanes: int):
                     steps[lane] = step
         return steps
 
-    return settle
+    return solve_lanes
 
 
 def proof(lanes: int):

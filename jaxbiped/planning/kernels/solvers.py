@@ -11,7 +11,7 @@ import numpy as np
 from numba import carray, njit
 
 from jaxbiped.core.ready_programs import TARGETS
-from jaxbiped.planning.kernels import dijkstra, foreign, grids, line_sweep
+from jaxbiped.planning.kernels import dijkstra, grids, line_sweep, xla_ffi
 from jaxbiped.planning.kernels.line_sweep import LANES
 from jaxbiped.planning.kernels.names import METHODS as METHODS
 
@@ -19,16 +19,16 @@ from jaxbiped.planning.kernels.names import METHODS as METHODS
 @njit
 def edge(arguments, k, size):
     """Edge costs number `k` of the arguments, flat."""
-    return foreign.array(arguments, k, size, np.float32)
+    return xla_ffi.array(arguments, k, size, np.float32)
 
 
-def solver(settle, lanes: int):
-    """`settle` for all arenas of a batch, `lanes` at a time, as `foreign.register` wants it."""
+def solver(solve_lanes, lanes: int):
+    """`solve_lanes` for all arenas of a batch, `lanes` at a time, as `xla_ffi.register` wants it."""
     unsettled = line_sweep.proof(lanes)
 
     @njit
     def solve(arguments, count, results):
-        dims = foreign.shape(arguments, 0)
+        dims = xla_ffi.shape(arguments, 0)
         height, width, batch = np.int64(dims[0]) - 2, np.int64(dims[1]) - 2, np.int64(dims[2])
         size = (height + 2) * (width + 2) * batch
         half = count == 5  # four kinds of edges and the goals
@@ -38,18 +38,18 @@ def solver(settle, lanes: int):
             edge(arguments, b, size), edge(arguments, b + 1, size), edge(arguments, b + 2, size),
             edge(arguments, b + 3, size),
         )  # fmt: skip
-        goals = carray(foreign.pointer(foreign.data(arguments, count - 1)), (batch, 2), np.int32)
-        field = carray(foreign.pointer(foreign.data(results, 0)), (batch, height, width), np.float32)
-        steps = carray(foreign.pointer(foreign.data(results, 1)), (batch,), np.int32)
-        settled = carray(foreign.pointer(foreign.data(results, 2)), (batch,), np.bool_)
-        cost = carray(foreign.pointer(foreign.data(results, 3)), (size,), np.float64)
+        goals = carray(xla_ffi.pointer(xla_ffi.data(arguments, count - 1)), (batch, 2), np.int32)
+        field = carray(xla_ffi.pointer(xla_ffi.data(results, 0)), (batch, height, width), np.float32)
+        steps = carray(xla_ffi.pointer(xla_ffi.data(results, 1)), (batch,), np.int32)
+        settled = carray(xla_ffi.pointer(xla_ffi.data(results, 2)), (batch,), np.bool_)
+        cost = carray(xla_ffi.pointer(xla_ffi.data(results, 3)), (size,), np.float64)
         cost[:] = np.inf
         for arena in range(batch):
             i, j = goals[arena]
             if 0 <= i < height and 0 <= j < width:
                 cost[((i + 1) * (width + 2) + j + 1) * batch + arena] = 0.0
         for first in range(0, batch - lanes + 1, lanes):
-            steps[first : first + lanes] = settle(edges, goals, cost, first, height, width, batch, half)
+            steps[first : first + lanes] = solve_lanes(edges, goals, cost, first, height, width, batch, half)
             for i in range(height):
                 for arena in range(first, first + lanes):
                     row = ((i + 1) * (width + 2) + 1) * batch + arena
@@ -81,10 +81,10 @@ def registered(kernel: str) -> tuple[str, int]:
     name, lanes = f"jaxbiped_{kernel}", 1 if kernel == "dijkstra" else LANES
     TARGETS[name] = __name__, (kernel,)
     if kernel == GRIDS:
-        foreign.register(name, grids.solver(), keep=True)
+        xla_ffi.register(name, grids.solver(), keep=True)
     else:
-        settle = dijkstra.settle if kernel == "dijkstra" else line_sweep.sweeps(lanes)
-        foreign.register(name, solver(settle, lanes), keep=True)
+        solve_lanes = dijkstra.solve_arena if kernel == "dijkstra" else line_sweep.sweeps(lanes)
+        xla_ffi.register(name, solver(solve_lanes, lanes), keep=True)
     return name, lanes
 
 
@@ -99,8 +99,8 @@ def solve_edges(edges, goal_ij, method: str):
     name, lanes = target(method)
     height, width, batch = edges[0].shape
     for e in edges:
-        foreign.expect(e, (height, width, batch), np.float32)
-    foreign.expect(goal_ij, (batch, 2), np.int32)
+        xla_ffi.expect(e, (height, width, batch), np.float32)
+    xla_ffi.expect(goal_ij, (batch, 2), np.int32)
     many = -(-batch // lanes) * lanes
     edges = [jnp.pad(e, ((0, 0), (0, 0), (0, many - batch)), constant_values=jnp.inf) for e in edges]
     goal_ij = jnp.pad(goal_ij, ((0, many - batch), (0, 0)), constant_values=-1)
@@ -126,7 +126,7 @@ def solve_grids(tables, classes, levels, goal_ij):
     batch, height, width = classes.shape
     inputs = (classes, levels, *tables, goal_ij)
     for array, (shape, dtype) in zip(inputs, grids.layout(batch, height, width), strict=True):
-        foreign.expect(array, shape, dtype)
+        xla_ffi.expect(array, shape, dtype)
     if batch < lanes:
         inputs = [jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1)) for a in inputs]
     many, size = max(batch, lanes), grids.room_size.py_func(height, width)
@@ -151,15 +151,15 @@ def solve_arrays(tables, classes, levels, goal_ij, cost, steps, settled) -> None
     inputs = (classes, levels, *tables, goal_ij)
     results = ((cost, classes.shape, np.float32), (steps, (batch,), np.int32), (settled, (batch,), np.bool_))
     for array, (shape, dtype) in zip(inputs, grids.layout(batch, height, width), strict=True):
-        foreign.expect(array, shape, dtype)
+        xla_ffi.expect(array, shape, dtype)
     for array, shape, dtype in results:
-        foreign.expect(array, shape, dtype)
+        xla_ffi.expect(array, shape, dtype)
     if batch < LANES or not all(array.flags.c_contiguous for array in (*inputs, cost, steps, settled)):
         raise ValueError(f"needs at least {LANES} arenas, in contiguous arrays")
     size = grids.room_size.py_func(height, width)  # compiling it would take longer
     name, _ = target(GRIDS)
     room = aligned(size, np.float64), aligned(4 * size, np.float32), aligned(3 * size, np.int8)
-    foreign.call(name, inputs, (cost, steps, settled, *room))
+    xla_ffi.call(name, inputs, (cost, steps, settled, *room))
 
 
 def aligned(shape, dtype) -> np.ndarray:

@@ -19,10 +19,10 @@ from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
 from jaxbiped.core.registry import FAMILIES
 from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.errors import InputError
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.config import EXECUTORS, SENSORS
-from jaxbiped.mission.queue import stack
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.statistics.comparison import paired
 from jaxbiped.statistics.schema import KNOWN

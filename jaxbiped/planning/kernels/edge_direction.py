@@ -13,7 +13,7 @@ from numba import njit
 
 from jaxbiped.core.ready_programs import TARGETS
 from jaxbiped.planning.costs import DIRECTIONS
-from jaxbiped.planning.kernels import foreign
+from jaxbiped.planning.kernels import xla_ffi
 
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 NAME = "jaxbiped_crossing_faces"
@@ -44,14 +44,14 @@ def square(known, level, i, j, k, half, slant):
 
 @njit(nogil=True)
 def solve(arguments, count, results):
-    """All arenas, as `foreign.register` wants it."""
-    dims = foreign.shape(arguments, 0)
+    """All arenas, as `xla_ffi.register` wants it."""
+    dims = xla_ffi.shape(arguments, 0)
     batch, height, width = np.int64(dims[0]), np.int64(dims[1]), np.int64(dims[2])
     cells = height * width
-    kinds = foreign.array(arguments, 0, batch * cells, np.bool_)
-    grounds = foreign.array(arguments, 1, batch * cells, np.int16)
-    half, slant = foreign.array(arguments, 2, 2, np.float32)
-    faces = foreign.array(results, 0, batch * 8 * cells, np.int8)
+    kinds = xla_ffi.array(arguments, 0, batch * cells, np.bool_)
+    grounds = xla_ffi.array(arguments, 1, batch * cells, np.int16)
+    half, slant = xla_ffi.array(arguments, 2, 2, np.float32)
+    faces = xla_ffi.array(results, 0, batch * 8 * cells, np.int8)
     for arena in range(batch):
         known = kinds[arena * cells : (arena + 1) * cells].reshape((height, width))
         level = grounds[arena * cells : (arena + 1) * cells].reshape((height, width))
@@ -71,7 +71,7 @@ def solve(arguments, count, results):
 def registered() -> str:
     """The name by which XLA knows the kernel; compiled at the first call."""
     TARGETS[NAME] = __name__, ()
-    foreign.register(NAME, solve, keep=True)
+    xla_ffi.register(NAME, solve, keep=True)
     return NAME
 
 
@@ -86,7 +86,7 @@ def crossing_faces(known, levels, half: int, slant: float):
         name = registered()
     batch, height, width = known.shape
     levels = levels.astype(jnp.int16)
-    foreign.expect(known, (batch, height, width), np.bool_)
-    foreign.expect(levels, (batch, height, width), np.int16)
+    xla_ffi.expect(known, (batch, height, width), np.bool_)
+    xla_ffi.expect(levels, (batch, height, width), np.int16)
     result = jax.ShapeDtypeStruct((batch, 8, height, width), jnp.int8)
     return jax.ffi.ffi_call(name, result)(known, levels, jnp.array([half, slant], jnp.float32))

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.movers import boxes_at, only
+from jaxbiped.arenas.moving_boxes import boxes_at, only
 from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.mission.execution import TOUCH, Execution
 from jaxbiped.mission.settings import Settings

@@ -9,11 +9,11 @@ import polars as pl
 
 from jaxbiped.mission.metric import format_of
 from jaxbiped.study import store
+from jaxbiped.study.batching import Point, Shard, groups_of, metrics_of, only_point, shards
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluate import Progress, evaluate
-from jaxbiped.study.groups import Point, Shard, groups_of, metrics_of, only_point, shards
 from jaxbiped.study.resume import resume as take_up
 
 # Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.

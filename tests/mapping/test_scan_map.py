@@ -12,9 +12,9 @@ from scipy.ndimage import binary_dilation
 from jaxbiped.arenas import sample
 from jaxbiped.errors import InputError
 from jaxbiped.mapping import cover
-from jaxbiped.mapping.chart import SCAN, lay_out, make_chart
 from jaxbiped.mapping.cover import CUBE, cover_voxels
 from jaxbiped.mapping.grid import Cell, GridSpec
+from jaxbiped.mapping.scan_map import SCAN, lay_out, make_chart
 from jaxbiped.mapping.truth import truth_grid
 from tests.mapping.scenes import BODY
 from tests.mapping.surfaces import sample_surfaces

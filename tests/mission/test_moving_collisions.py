@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.arenas.movers import Movers
+from jaxbiped.arenas.moving_boxes import Movers
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.encounter import CHECKS, met
 from jaxbiped.mission.execution import Execution
+from jaxbiped.mission.moving_collisions import CHECKS, met
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import Planned, World

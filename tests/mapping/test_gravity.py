@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from jaxbiped.mapping.floor import find_floor
-from jaxbiped.mapping.upright import FRAMES, find_upright, nearest_frame, set_upright, shortest
+from jaxbiped.mapping.gravity import FRAMES, find_upright, nearest_frame, set_upright, shortest
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -7,7 +7,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation.kalman_filter import Belief
 from jaxbiped.mapping import Cell, GridSpec, classify, empty
 from jaxbiped.mapping.params import MapConfig
-from jaxbiped.mission.judging import BACK, back_off, feel, hindered
+from jaxbiped.mission.simulated_step import BACK, back_off, feel, hindered
 from jaxbiped.mission.state import Mind
 from jaxbiped.motion.primitives import Command
 

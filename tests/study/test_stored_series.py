@@ -7,7 +7,7 @@ from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.statistics import compare
 from jaxbiped.study import create
-from jaxbiped.study.sides import choose, compare_sides, open_stored, side_by_side
+from jaxbiped.study.stored_series import choose, compare_sides, open_stored, side_by_side
 from tests.study.synthetic import rows
 
 PAIR = ("full", "floor_only")

@@ -14,12 +14,12 @@ from jaxbiped.arenas.source import OwnFamily, find_family, name_of
 from jaxbiped.core.component import kind_of, numbers_of, traced_component, with_numbers
 from jaxbiped.core.names import MOVING
 from jaxbiped.errors import InputError
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.eyes import RENDERED
-from jaxbiped.mission.footwork import WalkConfig
 from jaxbiped.mission.metric import Metric, column_of, find_metric
+from jaxbiped.mission.primitive_schedule import WalkConfig
 from jaxbiped.mission.program_for import program_for
-from jaxbiped.mission.queue import stack
 from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.strategies import Strategy, find_strategy

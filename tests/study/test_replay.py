@@ -4,11 +4,11 @@ import polars as pl
 import pytest
 
 from jaxbiped.errors import InputError
-from jaxbiped.study.again import examples, mission_of, play_again
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.sides import open_stored
+from jaxbiped.study.replay import examples, mission_of, play_again
+from jaxbiped.study.stored_series import open_stored
 from tests.study.synthetic import rows
-from tests.study.test_sides import stored
+from tests.study.test_stored_series import stored
 
 FRAME = rows(120, strategies=("full", "floor_only"))
 PAIR = ("full", "floor_only")
@@ -52,7 +52,7 @@ def test_the_mission_of_a_sweep_point(tmp_path):
 
 @pytest.mark.slow
 def test_missions_are_played_as_they_were(tmp_path):
-    from jaxbiped.study.conduct import conduct
+    from jaxbiped.study.run_study import conduct
 
     conduct(tmp_path / "r", StudyConfig(arenas=12, strategies=PAIR))
     kept = open_stored(tmp_path / "r")

@@ -10,13 +10,13 @@ import pytest
 from jaxbiped.arenas.scene import BoxConfig, SceneConfig, load_scene, to_arena
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.judging import carried_out
+from jaxbiped.mission.batched_driver import Jobs, stack
 from jaxbiped.mission.metrics import Energy
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, stack
 from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.simulated_driver import walk, walk_logged
+from jaxbiped.mission.simulated_step import carried_out
 from jaxbiped.mission.state import start
-from jaxbiped.mission.walking import walk, walk_logged
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing.camera import CameraConfig
 

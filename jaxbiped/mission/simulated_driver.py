@@ -27,10 +27,14 @@ from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridSpec
+from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, ending, no_results, tally
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.eyes import Eyes
-from jaxbiped.mission.footwork import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
-from jaxbiped.mission.judging import (
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.primitive_schedule import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
+from jaxbiped.mission.recorded_driver import Mission, Played, Recorder
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
+from jaxbiped.mission.simulated_step import (
     Plan,
     choose_rows,
     fresh,
@@ -41,12 +45,8 @@ from jaxbiped.mission.judging import (
     scatter,
     think_on,
 )
-from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, OnProgress, Result, ending, no_results, tally
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.stage import Stage
 from jaxbiped.mission.state import Carriage, Mind, World, start
-from jaxbiped.mission.stepped import Mission, Played, Recorder
 from jaxbiped.motion.primitives import CELL, Command, Primitive
 
 SLICE = 32  # steps (0.16 s) between two looks at who is done
@@ -105,7 +105,7 @@ def walk_logged(
     on_decision: Callable[[Played], None] = lambda _: None,
     eyes: Eyes | None = None,
 ) -> Mission:
-    """One mission of a simulated biped, with a log of everything; as `stepped.run_logged` gives it."""
+    """One mission of a simulated biped, with a log of everything; as `recorded_driver.run_logged` gives it."""
     arenas, points, world = jax.tree.map(
         lambda leaf: jnp.asarray(leaf)[None],
         (arena, settings, start(arena, settings, seed, program.spec, program.localisation)[0]),

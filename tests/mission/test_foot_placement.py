@@ -11,12 +11,12 @@ import pytest
 import tests.mission.strict  # noqa: F401  (the executor)
 from jaxbiped.arenas import load_scene
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.config import EXECUTORS
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import stack
+from jaxbiped.mission.recorded_driver import turn_once
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
-from jaxbiped.mission.stepped import turn_once
 from jaxbiped.study.evaluate import draw
 from tests.mission.conftest import CONFIG, PROGRAM, row
 from tests.mission.strict import Strict, footfall

@@ -8,7 +8,7 @@ import pytest
 
 from jaxbiped import planning
 from jaxbiped.mapping import Cell
-from jaxbiped.planning.rims import HIGHER, LOWER, RAGGED, TOES, rim_costs
+from jaxbiped.planning.edge_clearance import HIGHER, LOWER, RAGGED, TOES, rim_costs
 
 DIRECTIONS = [tuple(int(d) for d in direction) for direction in planning.DIRECTIONS]
 

@@ -10,7 +10,7 @@ import pytest
 
 from jaxbiped.arenas import KNOWN, PopulationConfig, at_time, only, sample
 from jaxbiped.arenas.families import CLEARANCE, SIZE_X, SIZE_Y
-from jaxbiped.arenas.movers import boxes_at
+from jaxbiped.arenas.moving_boxes import boxes_at
 
 KEY = jax.random.key(4)
 COUNT = 60

@@ -12,16 +12,16 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.mission.batched_driver import Jobs, begin, pick
 from jaxbiped.mission.cycle import conclude, think
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.executors import ODOMETRY, Execution
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, begin, pick
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.motion.selection import cell_of
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 from jaxbiped.sensing.view import Sightings, View
 
@@ -68,7 +68,7 @@ def choose_rows(mask: Bool[Array, "S"], new, old):
 
 @partial(jax.jit, static_argnames=("program",))
 def fresh(arenas: Arena, settings: Settings, jobs: Jobs, job: Int[Array, "S"], program: Program) -> tuple[World, Mind]:
-    """See `queue.begin`."""
+    """See `batched_driver.begin`."""
     return begin(arenas, settings, jobs, job, program)
 
 

@@ -17,9 +17,9 @@ from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.log import MissionLog, Picture
-from jaxbiped.mission.moments import ground, marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.snapshots import ground, marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
 from jaxbiped.mission.state import Mind, World, start
 from jaxbiped.motion.primitives import Command, Primitive
 
