@@ -19,7 +19,7 @@ QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_imp
   $(addprefix mission/, test_primitive_schedule.py test_recording.py test_scenes.py) \
   $(addprefix study/, test_clock.py test_store.py test_sweep.py) \
   $(addprefix statistics/, test_sample_size_plan.py test_schema.py test_sweep_points.py) \
-  $(addprefix report/, test_measured.py) $(addprefix viewer/, test_viewer_missions.py) \
+  $(addprefix report/, test_measured.py) $(addprefix viewer/, test_mission_choice.py) \
   $(addprefix commands/, test_cache.py test_reproduce.py test_view.py))
 
 $(VENV)/installed: pyproject.toml

@@ -7,7 +7,7 @@ mapping, localisation, planning, motion, mission; then statistics, study and rep
 never those after it.
 """
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 __version__ = "0.1.0"
 
@@ -15,12 +15,12 @@ lazy_package(
     __name__,
     {
         "api.study": "RandomArenas Scenes Study",
-        "api.register": "register",
-        "api.play": "PlayedMission play",
+        "api.registration": "register",
+        "api.single_mission": "PlayedMission play",
         "api.run": "evaluate load sweep",
         "api.results": "Results",
         "api.stored": "compare",
-        "api.plan": "plan",
+        "api.map_plan": "plan",
         "arenas.arena": "Arena",
         "arenas.config": "PopulationConfig",
         "arenas.make": "make_arena",

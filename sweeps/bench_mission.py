@@ -38,14 +38,14 @@ from jaxbiped.core.names import STRATEGIES
 from jaxbiped.devices import cores
 from jaxbiped.mission import decision
 from jaxbiped.mission.batched_driver import SLOTS, stack
-from jaxbiped.mission.cycle import conclude, cycle, sense
 from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.goal import goal_cell
+from jaxbiped.mission.mission_step import conclude, cycle, sense
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import draw, evaluate
+from jaxbiped.study.evaluation import draw, evaluate
 from jaxbiped.study.queues import run_all
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

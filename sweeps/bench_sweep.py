@@ -22,7 +22,7 @@ import jax
 
 from jaxbiped.devices import cores
 from jaxbiped.mission import batched_driver
-from jaxbiped.study import evaluate, store
+from jaxbiped.study import evaluation, store
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.run_study import table
 from jaxbiped.study.sweep import SweepConfig
@@ -76,7 +76,7 @@ def main() -> None:
     compile_all(config)
     compiling, programs = clock.seconds, len(batched_driver.COMPILED)
     print(f"{programs} program of the closed loop compiled, {compiling:.0f} s of compiling in all", flush=True)
-    evaluate.draw, evaluate.oracle_plan = others.timed(evaluate.draw), others.timed(evaluate.oracle_plan)
+    evaluation.draw, evaluation.oracle_plan = others.timed(evaluation.draw), others.timed(evaluation.oracle_plan)
     loops.seconds = 0.0
     points = tuple(config.points())
     with tempfile.TemporaryDirectory() as place:
@@ -84,7 +84,7 @@ def main() -> None:
         kind = {"seed": 0, "arenas": config.arenas, "points": table(points)}
         with store.create(Path(place) / "r", config, **kind) as results:
             append = writing.timed(results.append)
-            for shard, frame in evaluate.evaluate(config, points=points):
+            for shard, frame in evaluation.evaluate(config, points=points):
                 append(frame, shard.number, compile_time=0.0)
             rows = writing.timed(results.finish)(compile_time=0.0).rows
     wall, cpu = time.perf_counter() - begin, time.process_time() - begin_cpu
@@ -105,7 +105,7 @@ def compile_all(config: SweepConfig) -> None:
     limits = config.mission.limits.model_copy(update={"max_decisions": 1})
     mission = config.mission.model_copy(update={"limits": limits})
     short = config.model_copy(update={"mission": mission})
-    for _ in evaluate.evaluate(short, points=tuple(short.points())):
+    for _ in evaluation.evaluate(short, points=tuple(short.points())):
         pass
 
 

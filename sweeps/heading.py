@@ -43,7 +43,7 @@ from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
 from jaxbiped.statistics.intervals import mean_and_median, proportion
 from jaxbiped.study.config import StrategyName
 from jaxbiped.study.durations import fit
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 
 TOGETHER = 128  # arenas
 SAME, WORTH = 0.01, 0.5  # [s]

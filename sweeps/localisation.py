@@ -33,7 +33,7 @@ from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.paired import success_difference
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all

@@ -25,7 +25,7 @@ from jaxbiped.report.tables import terminal
 from jaxbiped.statistics.comparison import compare_named
 from jaxbiped.statistics.schema import FAMILIES
 from jaxbiped.study.config import Family, StrategyName, StudyConfig
-from jaxbiped.study.evaluate import evaluate
+from jaxbiped.study.evaluation import evaluate
 
 Executor = Literal["kinematic", "sampled", "native", "mjx"]
 

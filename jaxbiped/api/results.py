@@ -170,7 +170,7 @@ class Results:
             raise InputError(
                 "draws one field; filter `rows` and `points` for the others", field="plot", value=self.axes
             )
-        from jaxbiped.report.own_metric import own_metric
+        from jaxbiped.report.metric_figure import own_metric
 
         return own_metric(self.rows, self.points, metric, shown=self.shown)
 
@@ -198,7 +198,7 @@ class Results:
         Raises:
           InputError: a strategy, arena or point that is not there; a strategy whose code is not what it was.
         """
-        from jaxbiped.api.play import PlayedMission
+        from jaxbiped.api.single_mission import PlayedMission
         from jaxbiped.study.manifest import Manifest
         from jaxbiped.study.replay import play_again
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pydantic
 
-from jaxbiped.api.register import family_name, named, register
+from jaxbiped.api.registration import family_name, named, register
 from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.arenas.source import Family
 from jaxbiped.config import input_error

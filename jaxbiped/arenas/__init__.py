@@ -1,6 +1,6 @@
 """The world: arenas, random families, and scenes written by hand."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

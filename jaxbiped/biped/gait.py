@@ -19,9 +19,9 @@ from jaxtyping import Array, Float
 
 from jaxbiped.biped.config import JOINT_NAMES, RobotModelConfig
 from jaxbiped.biped.leg import Biped
-from jaxbiped.biped.posture import link_masses, posture
 from jaxbiped.biped.request import Request
 from jaxbiped.biped.score import Score, channels, compose, hip_height, ramp, schedule
+from jaxbiped.biped.whole_body import link_masses, posture
 from jaxbiped.biped.zmp import com_from_zmp, zmp_of_masses
 from jaxbiped.errors import InputError
 

@@ -14,7 +14,7 @@ from jaxbiped.formats import moving_ai, ros_map
 from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mapping.inflate import inflate
+from jaxbiped.mapping.inflation import inflate
 from jaxbiped.report.axis import CENTIMETRES, METRES, Axis
 
 SUFFIXES = {

@@ -16,10 +16,10 @@ import polars as pl
 from rich.console import Console
 
 from jaxbiped.biped.agreement import CROSSING, outcomes, paths
-from jaxbiped.biped.catalogue import catalogue
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import PrimitiveTable, generate
-from jaxbiped.biped.optimise import optimise
+from jaxbiped.biped.optimiser import optimise
+from jaxbiped.biped.primitive_catalogue import catalogue
 from jaxbiped.biped.request import Request
 from jaxbiped.biped.spread import SETS
 from jaxbiped.biped.trial import RIMS, Disturbance, Tolerance, passes_gate
@@ -29,7 +29,7 @@ from jaxbiped.config import config_hash, load
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.motion.robot import RobotConfig
-from jaxbiped.report.library import library, library_text
+from jaxbiped.report.library_file import library, library_text
 from jaxbiped.report.primitives import markdown, save_windows, terminal
 from jaxbiped.report.video import save_primitive
 from jaxbiped.study import store

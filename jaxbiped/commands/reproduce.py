@@ -22,13 +22,13 @@ from jaxbiped.reproduction.files import write
 from jaxbiped.reproduction.findings import Findings
 from jaxbiped.reproduction.gather import MISSIONS, experiment, lintel, mishaps, shortest, strategies
 from jaxbiped.reproduction.page import answer
-from jaxbiped.reproduction.saved import always, population, study
+from jaxbiped.reproduction.savings import always, population, study
 from jaxbiped.reproduction.staging import load_scenes
 from jaxbiped.reproduction.table_1 import SCENES
 from jaxbiped.reproduction.table_2 import NAMES, verify_all
 from jaxbiped.study import store
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import evaluate
+from jaxbiped.study.evaluation import evaluate
 from jaxbiped.study.runner import seeing
 from jaxbiped.terminal import command_line
 

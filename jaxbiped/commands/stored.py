@@ -10,11 +10,11 @@ from rich.console import Console
 from jaxbiped.commands.options.stored import StoredArgs
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.report.answer import answer
+from jaxbiped.report.answer_text import answer
+from jaxbiped.report.comparison_report import LIMITATIONS, question
 from jaxbiped.report.grid import to_grid
 from jaxbiped.report.page import PAGE, Section, page_of, render
 from jaxbiped.report.stored import equivalence_sheets, plan_sentences, terminal_sheets, written_sheets
-from jaxbiped.report.summary import LIMITATIONS, question
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.statistics import Comparison
 from jaxbiped.statistics.equivalence import equivalences

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.commands.options.tune import TuneArgs
-from jaxbiped.commands.progress import progress
+from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
@@ -25,7 +25,7 @@ from jaxbiped.report.tables import to_markdown, to_rich
 from jaxbiped.report.tuning import costs_sheet, costs_toml, fits_sheet, gaps_sheet, missions, sentence, write_tuning
 from jaxbiped.study import store
 from jaxbiped.study.durations import Fit, fit, table_2
-from jaxbiped.study.tune import TuneConfig, Tuning, tune
+from jaxbiped.study.tuning import TuneConfig, Tuning, tune
 from jaxbiped.terminal import command_line
 
 

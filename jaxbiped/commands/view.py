@@ -7,7 +7,7 @@ import webbrowser
 
 from jaxbiped.commands.options.view import ViewArgs
 from jaxbiped.errors import InputError
-from jaxbiped.viewer.missions import Missions, Place, Study, missions
+from jaxbiped.viewer.mission_choice import Missions, Place, Study, missions
 from jaxbiped.viewer.server import refuse_taken, require, serving
 
 

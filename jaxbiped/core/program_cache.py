@@ -20,7 +20,7 @@ from pathlib import Path
 import jax
 
 from jaxbiped.core import kept_files
-from jaxbiped.core.cache_folder import MOST_PROGRAMS, PROGRAMS, cache_folder
+from jaxbiped.core.cache_location import MOST_PROGRAMS, PROGRAMS, cache_folder
 
 KIND = b"jaxbiped program 1\n"
 QUICK = 0.05  # [s] of compiling: what takes less is compiled again

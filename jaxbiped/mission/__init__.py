@@ -1,6 +1,6 @@
 """The closed loop: sense, localise, map, plan, select, execute, until each mission has ended."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

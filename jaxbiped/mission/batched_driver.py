@@ -22,7 +22,7 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready
 from jaxbiped.devices import ALL, EACH, on_each, placed
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.cycle import cycle
+from jaxbiped.mission.mission_step import cycle
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind, Planned, World, start

@@ -18,7 +18,7 @@ from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.execution import CHECKS, ODOMETRY, TOUCH, Execution, Executor
-from jaxbiped.mission.sampled import sampled
+from jaxbiped.mission.sampled_executor import sampled
 from jaxbiped.mission.settings import Settings
 from jaxbiped.mission.state import World
 from jaxbiped.motion.primitives import Command, duration

@@ -13,7 +13,7 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.config import RENDERED as RENDERED
-from jaxbiped.mission.cycle import SENSE
+from jaxbiped.mission.mission_step import SENSE
 from jaxbiped.mission.settings import VISUAL, MissionConfig, Settings
 from jaxbiped.mission.state import Carriage, Mind, World
 from jaxbiped.sensing.camera import CameraConfig, Mount, mount, placed

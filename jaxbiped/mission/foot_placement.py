@@ -12,7 +12,7 @@ from jaxbiped import mapping
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Mind
-from jaxbiped.motion.approach import Crossing, approach, next_crossing, remembered
+from jaxbiped.motion.edge_approach import Crossing, approach, next_crossing, remembered
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import edges
 from jaxbiped.sensing.camera import mount
@@ -37,7 +37,7 @@ def place_feet(
 ) -> tuple[Mind, Command]:
     """The command, or what it takes first for the feet to stand right before the next edge; and what is known of that.
 
-    One robot. `directions` are the first `motion.approach.foresight` moves of its path.
+    One robot. `directions` are the first `motion.edge_approach.foresight` moves of its path.
     """
     spec, pose = program.spec, mind.belief.pose
     crossing = next_crossing(pose, ij, directions, classes, levels, spec)

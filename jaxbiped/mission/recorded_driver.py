@@ -13,10 +13,10 @@ from jaxtyping import Array, Float, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.cycle import cycle
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.log import MissionLog, Picture
+from jaxbiped.mission.mission_step import cycle
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.snapshots import ground, marks, mind_pose, moment, nothing, outlines, pose_of, walk_of

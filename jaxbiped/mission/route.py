@@ -7,7 +7,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import planning
 from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.motion.approach import foresight
+from jaxbiped.motion.edge_approach import foresight
 from jaxbiped.motion.selection import stride
 from jaxbiped.planning.edge_clearance import rim_costs
 from jaxbiped.planning.planners import Problem

@@ -13,9 +13,9 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.batched_driver import Jobs, begin, pick
-from jaxbiped.mission.cycle import conclude, think
 from jaxbiped.mission.decision import Thought
 from jaxbiped.mission.executors import ODOMETRY, Execution
+from jaxbiped.mission.mission_step import conclude, think
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import Program, Settings
 from jaxbiped.mission.state import Carriage, Mind, World

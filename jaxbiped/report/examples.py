@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from jaxbiped.errors import InputError
 from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.report.page import Section
+from jaxbiped.report.page_figures import WIDTH, Plot
 from jaxbiped.report.pictures import draw_map, moment
-from jaxbiped.report.plots import WIDTH, Plot
 from jaxbiped.report.style import own_style
 from jaxbiped.study.replay import Origin, examples, play_again
 

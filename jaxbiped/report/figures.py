@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import MEASURES, SUCCESS, Measure, part, verdict
+from jaxbiped.report.answer_text import MEASURES, SUCCESS, Measure, part, verdict
 from jaxbiped.report.style import own_style
 from jaxbiped.report.words import OPEN
 from jaxbiped.statistics import ALL, CODES, Comparison, Estimate, Stratum, proportion

@@ -17,7 +17,7 @@ from rich.console import Group
 from jaxbiped.biped.gait import PrimitiveTable
 from jaxbiped.files import write_whole
 from jaxbiped.mission.library import LibraryConfig
-from jaxbiped.report.library import displacement
+from jaxbiped.report.library_file import displacement
 from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.report.words import NONE, number, percent, signed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jaxbiped.report.answer import MEASURES, Measure
+from jaxbiped.report.answer_text import MEASURES, Measure
 from jaxbiped.report.tables import (
     Sheet,
     code_sheet,

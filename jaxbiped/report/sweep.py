@@ -11,7 +11,7 @@ from rich.console import Group
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import MEASURES, Measure
+from jaxbiped.report.answer_text import MEASURES, Measure
 from jaxbiped.report.figures import saver
 from jaxbiped.report.sweep_answer import difference, sentences
 from jaxbiped.report.sweep_figures import sweep_figure

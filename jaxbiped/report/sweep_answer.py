@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jaxbiped.report.answer import MEASURES, Measure, listed, part
+from jaxbiped.report.answer_text import MEASURES, Measure, listed, part
 from jaxbiped.report.words import NONE, brackets, signed
 from jaxbiped.statistics import Estimate, PairComparison
 from jaxbiped.statistics.idle_axes import IdleSpan

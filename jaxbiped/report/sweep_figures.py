@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from jaxbiped.report.answer import MEASURES, SUCCESS, TIME, Measure, part
+from jaxbiped.report.answer_text import MEASURES, SUCCESS, TIME, Measure, part
 from jaxbiped.report.figures import INK, error_bars, legend_above, look, style
 from jaxbiped.report.style import own_style
 from jaxbiped.statistics import Estimate

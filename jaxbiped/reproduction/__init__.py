@@ -1,6 +1,6 @@
 """The experiments of the paper, repeated: what it publishes, where a mission's time goes, the test scenes, the page."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

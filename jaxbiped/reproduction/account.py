@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from jaxbiped.biped.catalogue import PAPER
+from jaxbiped.biped.primitive_catalogue import PAPER
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import NAMES, Mission
 from jaxbiped.motion.primitives import CELL, EIGHTH, DurationConfig, Primitive

@@ -9,7 +9,7 @@ from jaxbiped.mission.log import MissionLog
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.reproduction.account import Measuring, Record
 from jaxbiped.reproduction.mishaps import Ending
-from jaxbiped.reproduction.saved import Population
+from jaxbiped.reproduction.savings import Population
 from jaxbiped.reproduction.table_1 import Shown
 from jaxbiped.reproduction.table_2 import Verified
 

@@ -15,7 +15,7 @@ from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.report.animation import disparity_image
 from jaxbiped.report.examples import picture
 from jaxbiped.report.measured import screen, voxel_figure
-from jaxbiped.report.plots import WIDTH, Plot
+from jaxbiped.report.page_figures import WIDTH, Plot
 from jaxbiped.report.style import own_style
 from jaxbiped.reproduction.pictures import map_figure
 

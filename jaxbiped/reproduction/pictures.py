@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.report.examples import picture
+from jaxbiped.report.page_figures import WIDTH, Plot
 from jaxbiped.report.pictures import draw_map, moment
-from jaxbiped.report.plots import WIDTH, Plot
 from jaxbiped.report.style import own_style
 
 KEY = (

@@ -8,18 +8,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
 from jaxbiped.motion.primitives import CELL
-from jaxbiped.report.answer import DISTANCE, TIME, Measure
+from jaxbiped.report.answer_text import DISTANCE, TIME, Measure
 from jaxbiped.report.figures import canvas, style
 from jaxbiped.report.grid import to_grid
 from jaxbiped.report.page import Section
-from jaxbiped.report.plots import WIDTH, Plot
+from jaxbiped.report.page_figures import WIDTH, Plot
 from jaxbiped.report.style import own_style
 from jaxbiped.report.svg import INK, inline, themed
 from jaxbiped.report.sweep_figures import BETTER_UP, Panel, fill_map
 from jaxbiped.report.tables import Sheet, code_sheet, pair_sheet, strategy_sheets
 from jaxbiped.report.words import signed
 from jaxbiped.reproduction.paper import SAVED
-from jaxbiped.reproduction.saved import Population, break_even, measured_break_even
+from jaxbiped.reproduction.savings import Population, break_even, measured_break_even
 from jaxbiped.statistics.intervals import mean_and_median
 
 BAR, PAPER = "#0072B2", "#D55E00"

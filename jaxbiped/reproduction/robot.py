@@ -15,7 +15,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.mission.recorded_driver import NAMES
 from jaxbiped.motion.primitives import Primitive
-from jaxbiped.report.plots import Plot
+from jaxbiped.report.page_figures import Plot
 from jaxbiped.reproduction.paper import EXPERIMENTS, Experiment
 from jaxbiped.reproduction.scenery import frames_of, nearest_to, photographs
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from jaxbiped.biped.catalogue import FIVE, Pace, catalogue
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import generate
+from jaxbiped.biped.primitive_catalogue import FIVE, Pace, catalogue
 from jaxbiped.biped.spread import MILD
 from jaxbiped.biped.trial import Disturbance, Tolerance
 from jaxbiped.biped.verify import trials

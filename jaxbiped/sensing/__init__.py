@@ -3,7 +3,7 @@
 Functions are written for one arena; the mission maps them.
 """
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

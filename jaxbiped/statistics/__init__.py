@@ -1,6 +1,6 @@
 """Paired statistics of strategies, as pure functions of the rows of a study."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

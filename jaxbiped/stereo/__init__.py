@@ -1,6 +1,6 @@
 """A real stereo camera: rectified pairs to disparity, and to points."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

@@ -14,10 +14,10 @@ from jaxbiped.sensing.landmarks import LandmarkNoise
 from jaxbiped.sensing.shot import Shot
 from jaxbiped.sensing.view import Sightings, View
 from jaxbiped.stereo.calibration import ideal
+from jaxbiped.stereo.landmark_matching import floor_disparity, recognise
 from jaxbiped.stereo.landmarks import find
 from jaxbiped.stereo.matching import Disparity, MatchParams, grey, match
 from jaxbiped.stereo.points import to_points
-from jaxbiped.stereo.recognise import floor_disparity, recognise
 from jaxbiped.stereo.renderer import Pair, Renderer
 from jaxbiped.stereo.texture import textured
 

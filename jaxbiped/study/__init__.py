@@ -1,6 +1,6 @@
 """Studies: many missions, and the store of their results."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

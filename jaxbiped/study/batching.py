@@ -19,10 +19,10 @@ from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.metric import Metric, column_of, find_metric
 from jaxbiped.mission.primitive_schedule import WalkConfig
-from jaxbiped.mission.program_for import program_for
 from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.mission.terrain_check import program_for
 from jaxbiped.sensing.camera import CameraConfig
 from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.arena_kinds import ANY, ArenaKind, kinds_of

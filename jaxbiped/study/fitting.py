@@ -18,7 +18,7 @@ from jaxbiped.sensing.camera import CameraConfig, Mount
 from jaxbiped.sensing.landmarks import LandmarkConfig, sight
 from jaxbiped.sensing.presets import RayConfig, SensorConfig
 from jaxbiped.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
-from jaxbiped.stereo.fit_landmarks import Sight, fit_landmarks
+from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
 from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, standing, with_rays
 
 CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # at which the least one that can be matched is looked for

@@ -30,7 +30,7 @@ from jaxbiped.statistics.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.arena_kinds import kinds_of
 from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
 from jaxbiped.study.config import OF_COMPONENTS
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
 from jaxbiped.study.runner import check_mission, play_one, seeing
 from jaxbiped.study.sweep import point_at

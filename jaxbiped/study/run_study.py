@@ -13,8 +13,8 @@ from jaxbiped.study.batching import Point, Shard, groups_of, metrics_of, only_po
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import Progress, evaluate
-from jaxbiped.study.resume import resume as take_up
+from jaxbiped.study.evaluation import Progress, evaluate
+from jaxbiped.study.resumption import resume as take_up
 
 # Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.
 Engine = Callable[..., Iterator[tuple[Shard, pl.DataFrame]]]

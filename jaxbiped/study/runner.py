@@ -16,10 +16,10 @@ from jaxbiped.core.component import traced_component, with_numbers
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.mission.batched_driver import Result
 from jaxbiped.mission.eyes import Eyes, eyes_for
-from jaxbiped.mission.program_for import program_for
 from jaxbiped.mission.recorded_driver import Mission, Played, run_logged
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
 from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.mission.terrain_check import program_for
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.study.batching import Group, numbers_under
 
@@ -36,7 +36,7 @@ def noise_of_word(seed: UInt32[Array, ""]) -> UInt32[Array, ""]:
 
 
 def program_of(config: MissionConfig, arena: Arena) -> Program:
-    """The static part of missions in one arena; see `mission.program_for`."""
+    """The static part of missions in one arena; see `terrain_check.program_for`."""
     return program_for(config, tuple(round(float(side), 6) for side in np.asarray(arena.size_xy)), arena.terrain)
 
 

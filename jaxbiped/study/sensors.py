@@ -18,15 +18,15 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
-from jaxbiped.mission.cycle import sense
 from jaxbiped.mission.eyes import Eyes
+from jaxbiped.mission.mission_step import sense
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.settings import MissionConfig, Program, Settings, program
 from jaxbiped.mission.state import Mind, World, start
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.view import View
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 
 AREA = (SIZE_X, SIZE_Y)
 AWAY = (0.25, 0.80)  # [m] before what a view is aimed at

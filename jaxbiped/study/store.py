@@ -5,7 +5,7 @@
     <folder>/rows/part-00000.parquet  the rows of one block of arenas, or of another unit that the writer numbers
 
 Every file is whole or not there; a shard that is there is done. A study that was stopped is therefore its manifest and
-some of its shards, and the numbers of those that are missing say what is left to do (`study.resume`).
+some of its shards, and the numbers of those that are missing say what is left to do (`study.resumption`).
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ class SweepConfig(StudyConfig):
             alone or with the others of its point; more points than memory holds.
         """
         from jaxbiped.arenas.families import SIZE_X, SIZE_Y
-        from jaxbiped.study.memory import most_points
+        from jaxbiped.study.memory_limit import most_points
 
         fields = self.fields()
         if self.size() > (most := most_points(len(self.strategies))):

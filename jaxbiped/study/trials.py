@@ -21,7 +21,7 @@ from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, Tally, Wor
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionConfig, Settings, program
 from jaxbiped.planning import Costs
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 
 VECTORS, BLOCK = 8, 16  # cost vectors and arenas that one queue has room for
 SLOTS = 16  # missions at once: a queue that is not much longer than its slots idles most of them at its end

@@ -13,9 +13,9 @@ from jaxtyping import Float, UInt8
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.report.pictures import PLAN, TRACK
 from jaxbiped.viewer import layers
+from jaxbiped.viewer.mission_file import Shown
 from jaxbiped.viewer.puppet import Puppet
-from jaxbiped.viewer.shown import Shown
-from jaxbiped.viewer.solids import arc, rgb, solids
+from jaxbiped.viewer.triangles import arc, rgb, solids
 from jaxbiped.viewer.words import BELIEF
 
 LAYERS = {

@@ -10,7 +10,7 @@ from jaxtyping import Float, UInt8
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.report.pictures import class_image
-from jaxbiped.viewer.solids import height_colours
+from jaxbiped.viewer.triangles import height_colours
 
 TILE, VOXEL = 0.93, 0.88  # shares of a cell and of a voxel that are drawn
 TILE_HEIGHT, IN_FLOOR = 0.0015, -0.006  # [m] of the tiles' middles above their ground; of those not to be seen

@@ -13,11 +13,11 @@ import numpy as np
 from jaxbiped.report.animation import disparity_image
 from jaxbiped.viewer.canvas import FIELD_OF_VIEW, LAYERS, Canvas, viewpoint
 from jaxbiped.viewer.layers import moment_at
-from jaxbiped.viewer.missions import Missions, Place
-from jaxbiped.viewer.motion import arrivals, motion
+from jaxbiped.viewer.mission_choice import Missions, Place
+from jaxbiped.viewer.mission_file import Shown
+from jaxbiped.viewer.mission_motion import arrivals, motion
 from jaxbiped.viewer.picker import Picker
 from jaxbiped.viewer.puppet import Puppet
-from jaxbiped.viewer.shown import Shown
 from jaxbiped.viewer.words import legend, status
 
 FRAMES_PER_SECOND = 15.0

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from jaxbiped.errors import InputError
-from jaxbiped.viewer.missions import Missions, Place
-from jaxbiped.viewer.shown import Shown
+from jaxbiped.viewer.mission_choice import Missions, Place
+from jaxbiped.viewer.mission_file import Shown
 
 ANY = "arena"  # label of the field for any number
 

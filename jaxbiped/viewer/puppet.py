@@ -12,7 +12,7 @@ from jaxtyping import Float
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import home_table
 from jaxbiped.biped.model import home_qpos, robot_spec
-from jaxbiped.viewer.solids import Solid, solid
+from jaxbiped.viewer.triangles import Solid, solid
 
 EYE = "camera_left"  # site of the camera whose pictures are kept
 

@@ -9,9 +9,9 @@ import socket
 from collections.abc import Iterator
 
 from jaxbiped.errors import InputError
-from jaxbiped.viewer.missions import Missions, Place
+from jaxbiped.viewer.mission_choice import Missions, Place
+from jaxbiped.viewer.mission_file import Shown
 from jaxbiped.viewer.page import Page
-from jaxbiped.viewer.shown import Shown
 
 
 @contextlib.contextmanager

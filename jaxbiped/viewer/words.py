@@ -7,7 +7,7 @@ import numpy as np
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.report.pictures import BUMP_SHADES, COLOURS, INK, PLAN, TRACK, caption
-from jaxbiped.viewer.solids import height_colours
+from jaxbiped.viewer.triangles import height_colours
 
 BELIEF = "#d06000"
 HEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4)  # [m] of the legend

@@ -15,7 +15,7 @@ from jaxbiped.geometry.height_field import HeightField
 from jaxbiped.geometry.rays import cast_boxes, key, nearness
 from jaxbiped.mapping import Cell, GridSpec, truth_grid
 from jaxbiped.mission.executors import kinematic
-from jaxbiped.mission.sampled import sampled
+from jaxbiped.mission.sampled_executor import sampled
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive

@@ -7,9 +7,9 @@ import pytest
 
 from jaxbiped.biped import request as ask
 from jaxbiped.biped.agreement import CROSSING, Paths, outcomes, paths
-from jaxbiped.biped.catalogue import FIVE, catalogue
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import generate
+from jaxbiped.biped.primitive_catalogue import FIVE, catalogue
 from jaxbiped.biped.trial import Tolerance
 from jaxbiped.biped.verify import trials
 

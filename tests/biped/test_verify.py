@@ -9,9 +9,9 @@ import pytest
 
 from jaxbiped.biped import request as ask
 from jaxbiped.biped import verify
-from jaxbiped.biped.catalogue import FAST, PAPER, catalogue
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import generate
+from jaxbiped.biped.primitive_catalogue import FAST, PAPER, catalogue
 from jaxbiped.biped.spread import HARD, MILD, DisturbanceSet
 from jaxbiped.biped.trial import Disturbance, Tolerance, play
 

@@ -16,7 +16,7 @@ from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.statistics.schema import FAMILIES
 from jaxbiped.study import trials
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import evaluate
+from jaxbiped.study.evaluation import evaluate
 from jaxbiped.study.trials import Trials
 
 PAPER = np.array([1.0, 1.0, 5.0, 10.0, 100.0])

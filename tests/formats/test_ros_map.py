@@ -13,7 +13,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.formats import ros_map
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mapping.inflate import inflate
+from jaxbiped.mapping.inflation import inflate
 
 DATA = Path(__file__).parent.parent / "data"
 U, F, X = int(Cell.UNMEASURED), int(Cell.FLOOR), int(Cell.OBSTACLE)

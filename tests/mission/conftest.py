@@ -18,7 +18,7 @@ from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import World, start
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from tests.mission.replay import Moment
 
 ARENAS, SETTINGS, JOBS, SLOTS = 32, 16, 32, 8

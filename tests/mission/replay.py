@@ -17,7 +17,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.mapping.gridmap import GridMap
 from jaxbiped.mapping.relief import FACE, Surfaces
-from jaxbiped.mission.cycle import SENSE
+from jaxbiped.mission.mission_step import SENSE
 from jaxbiped.mission.state import World
 from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.view import View

@@ -12,8 +12,8 @@ import pytest
 from jaxbiped.arenas.scene import load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.cycle import cycle, sense
 from jaxbiped.mission.eyes import eyes_for, where
+from jaxbiped.mission.mission_step import cycle, sense
 from jaxbiped.mission.sensors import RayCast
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import start

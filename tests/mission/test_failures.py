@@ -11,8 +11,8 @@ from jaxbiped.arenas.scene import SceneConfig, to_arena
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.cycle import conclude
 from jaxbiped.mission.executors import kinematic
+from jaxbiped.mission.mission_step import conclude
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.state import Planned, World, start
 from jaxbiped.motion.primitives import Command, Primitive

@@ -17,7 +17,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import turn_once
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from tests.mission.conftest import CONFIG, PROGRAM, row
 from tests.mission.strict import Strict, footfall
 

@@ -14,7 +14,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.planning import Costs, Rules
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from tests.mission.conftest import CONFIG, PROGRAM, pad, play, row
 from tests.reference import mapping, motion, planning
 

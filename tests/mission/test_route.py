@@ -23,7 +23,7 @@ from jaxbiped.mission.route import pose_problem, times_of
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from tests.mission.conftest import CONFIG, PROGRAM
 
 B = 24  # maps

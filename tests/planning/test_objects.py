@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from jaxbiped.core.cache_folder import VARIABLE, cache_folder
+from jaxbiped.core.cache_location import VARIABLE, cache_folder
 from jaxbiped.planning.kernels import objects, xla_ffi
 
 NAME = "jaxbiped_test_doubled"

@@ -16,9 +16,9 @@ import numpy as np
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation import Belief
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.decision import LOOK_AROUND
 from jaxbiped.mission.goal import MARGIN
+from jaxbiped.mission.mission_step import SENSE
 from jaxbiped.mission.outcome import Code
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.motion.selection import stride

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from jaxbiped.report.answer import SUCCESS, TIME
+from jaxbiped.report.answer_text import SUCCESS, TIME
 from jaxbiped.report.sweep_answer import idle_sentence, measure_sentence, sentences
 from jaxbiped.statistics import Estimate, compare
 from jaxbiped.statistics.idle_axes import IdleSpan

@@ -7,7 +7,7 @@ from jaxbiped.arenas.arena import CIRCLE, SQUARE
 from jaxbiped.sensing.landmarks import RENDERED as LANDMARKS
 from jaxbiped.sensing.noise import RENDERED
 from jaxbiped.stereo import fit
-from jaxbiped.stereo.fit_landmarks import Sight, fit_landmarks
+from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
 
 HEIGHT, WIDTH, MOST = 384, 512, 159.0
 

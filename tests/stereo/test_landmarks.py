@@ -17,7 +17,7 @@ from jaxbiped.sensing.view import Sightings
 from jaxbiped.stereo import landmarks as marks
 from jaxbiped.stereo import scene
 from jaxbiped.stereo.calibration import ideal
-from jaxbiped.stereo.recognise import floor_disparity, recognise
+from jaxbiped.stereo.landmark_matching import floor_disparity, recognise
 from jaxbiped.stereo.renderer import Renderer
 
 CAMERA = CameraConfig()

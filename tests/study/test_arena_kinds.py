@@ -14,7 +14,7 @@ from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.arena_kinds import ANY, kinds_of
 from jaxbiped.study.batching import group_points, only_point
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from tests.api.conftest import EXAMPLES
 
 CONFIGS = EXAMPLES.parents[1] / "configs"

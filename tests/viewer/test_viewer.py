@@ -16,12 +16,12 @@ from jaxbiped.mission.log import Walk
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.snapshots import outlines
 from jaxbiped.report.pictures import COLOURS
-from jaxbiped.viewer import layers, solids
+from jaxbiped.viewer import layers, triangles
 from jaxbiped.viewer.canvas import FIELD_OF_VIEW, viewpoint
-from jaxbiped.viewer.motion import motion
+from jaxbiped.viewer.mission_file import Shown
+from jaxbiped.viewer.mission_motion import motion
 from jaxbiped.viewer.puppet import Puppet
 from jaxbiped.viewer.server import serving
-from jaxbiped.viewer.shown import Shown
 from tests.report.test_pictures import mission
 from tests.viewer.browser import CHROMIUM, browsing
 
@@ -87,7 +87,7 @@ def test_points_of_one_measurement_and_of_all():
     assert len(layers.cloud(log, 2, earlier=True).xyz) == 40 + 30 + 20
     assert len(layers.cloud(log, 4, earlier=True).xyz) == 40 + 30 + 20 + 10  # the last one repeats the one before
     assert len(layers.cloud(mission(), 1).xyz) == 0
-    low, high = solids.height_colours(np.array([0.0, 0.4])).astype(int)
+    low, high = triangles.height_colours(np.array([0.0, 0.4])).astype(int)
     assert high.sum() > low.sum() + 100
 
 
@@ -109,7 +109,7 @@ def test_each_time_has_its_moment(time, expected):
 
 def test_boxes_stand_where_they_do():
     log = seen()
-    found = {solid.name: solid for solid in solids.solids(log)}
+    found = {solid.name: solid for solid in triangles.solids(log)}
     for k, outline in enumerate(log.outlines):
         box = found[f"arena/box_{k}"]
         low, high = box.vertices.min(axis=0), box.vertices.max(axis=0)

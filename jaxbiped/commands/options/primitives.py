@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 import pydantic
 
-from jaxbiped.biped.catalogue import PAPER, Pace
+from jaxbiped.biped.primitive_catalogue import PAPER, Pace
 from jaxbiped.commands.options.base import Options
 from jaxbiped.motion.config import Goal
 

@@ -1,6 +1,6 @@
 """Planning over (cell, heading) with the times of the primitives: the time-optimal way, turns included."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

@@ -17,8 +17,8 @@ from jaxbiped.core.checks import reals
 from jaxbiped.errors import InputError
 from jaxbiped.planning import kernels
 from jaxbiped.planning.arguments import are_classes, grid_arguments
+from jaxbiped.planning.cost_field import FEW, LARGE
 from jaxbiped.planning.costs import BASE_PITCH, DIRECTIONS, Rules
-from jaxbiped.planning.field import FEW, LARGE
 from jaxbiped.planning.heading.times import Moves, Times, checked_pitch, heading_moves, moves_of
 
 METHODS = ("wavefront", "line_sweep", "dijkstra")

@@ -1,6 +1,6 @@
 """Planners compiled by Numba for a CPU, as functions of JAX and of NumPy arrays. Numba loads at the first use."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

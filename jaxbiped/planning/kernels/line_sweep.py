@@ -19,7 +19,7 @@ LEFT = DJ[:4]  # columns that the first four directions go
 
 
 def sweeps(lanes: int):
-    """A function `solve_lanes(edges, goals, cost, first, height, width, batch, half) -> steps`, so many arenas a vector.
+    """A function `solve_lanes(edges, goals, cost, first, height, width, batch, half) -> steps` of many arenas a vector.
 
     Relaxes arenas `first` to `first + lanes - 1` until nothing changes: passes down, up, down, ... Each row relaxes
     from the row before and along itself, rightwards and then leftwards, so that a path which never turns back settles

@@ -23,7 +23,7 @@ from numba.core.registry import cpu_target
 from numba.core.runtime import rtsys
 
 from jaxbiped.core import kept_files
-from jaxbiped.core.cache_folder import KERNELS, cache_folder
+from jaxbiped.core.cache_location import KERNELS, cache_folder
 
 PLANNING = Path(__file__).parents[1]
 SOURCES = (PLANNING, PLANNING.parent / "mapping" / "grid.py")

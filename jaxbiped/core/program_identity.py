@@ -18,7 +18,7 @@ import jaxlib
 import numpy as np
 from jax._src import config
 
-from jaxbiped.core.lazy_package import IMPORTED, REPLACED
+from jaxbiped.core.lazy_loading import IMPORTED, REPLACED
 
 PLAIN = bool | int | float | str | bytes | None
 OURS = "jaxbiped"

@@ -16,7 +16,7 @@ from jaxbiped.mission.settings import CostConfig, MissionConfig
 from jaxbiped.statistics.intervals import Estimate, mean_and_median
 from jaxbiped.statistics.paired import PairedMetric, metric_difference, success_difference
 from jaxbiped.study.durations import fit
-from jaxbiped.study.evaluate import Progress
+from jaxbiped.study.evaluation import Progress
 from jaxbiped.study.search import directions, gradient, sobol
 from jaxbiped.study.trials import NAMES, Trials, objective
 from jaxbiped.study.tuning_config import TuneConfig as TuneConfig

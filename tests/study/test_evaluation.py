@@ -14,7 +14,7 @@ from jaxbiped.mission import batched_driver
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.statistics.schema import validate
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import draw, evaluate
+from jaxbiped.study.evaluation import draw, evaluate
 from jaxbiped.study.sweep import SweepConfig
 
 EVENTS = []

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.core.host_call import host_call
+from jaxbiped.core.host_callback import host_call
 
 
 def shape_of(*arrays):

@@ -11,7 +11,7 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from jaxbiped.mission.metric import MetricFormat
-from jaxbiped.report.answer import MEASURES
+from jaxbiped.report.answer_text import MEASURES
 from jaxbiped.report.figures import canvas, error_bars, legend_above, look
 from jaxbiped.report.measures import metric_measure
 from jaxbiped.report.style import own_style

@@ -13,7 +13,7 @@ from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import Planned
 from jaxbiped.study.search import sobol
 from jaxbiped.study.trials import objective
-from jaxbiped.study.tune import FIRST_TRAINING, TuneConfig, tune
+from jaxbiped.study.tuning import FIRST_TRAINING, TuneConfig, tune
 
 BEST = np.array([2.0, 3.0, 4.0, 8.0])  # C1 to C4 of the made-up missions, in C0
 SMALL = {"arenas": 48, "test_arenas": 60, "steps": 40, "batch": 16, "sweep": 1}

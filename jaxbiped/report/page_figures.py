@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 from matplotlib.figure import Figure
 
-from jaxbiped.report.answer import MEASURES, Measure, part, verdict
+from jaxbiped.report.answer_text import MEASURES, Measure, part, verdict
 from jaxbiped.report.figures import CODE_COLOURS, canvas, difficulty, forest_row, legend_above, look, times
 from jaxbiped.report.measures import metric_measures
 from jaxbiped.report.svg import INK, LINE, inline, themed

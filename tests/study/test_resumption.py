@@ -18,7 +18,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.study import store
 from jaxbiped.study.lock import FolderLock
-from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.resumption import refuse_taken
 from jaxbiped.study.run_study import conduct
 from tests.study.engine import CONFIG, TABLE, engine
 

@@ -6,7 +6,7 @@ import pytest
 
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.reproduction.paper import SAVED
-from jaxbiped.reproduction.saved import (
+from jaxbiped.reproduction.savings import (
     CROSSES,
     GOES_ROUND,
     always,

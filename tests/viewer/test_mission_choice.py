@@ -8,8 +8,8 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.recording import save_log
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.viewer import missions as room
-from jaxbiped.viewer.missions import Files, Study, choices, missions
+from jaxbiped.viewer import mission_choice as room
+from jaxbiped.viewer.mission_choice import Files, Study, choices, missions
 from jaxbiped.viewer.server import serving
 from tests.study.synthetic import rows
 from tests.study.test_stored_series import stored

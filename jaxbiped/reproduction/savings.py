@@ -16,7 +16,7 @@ from jaxbiped.motion.primitives import CELL
 from jaxbiped.reproduction.paper import TABLE_2
 from jaxbiped.statistics.comparison import ALL, Comparison, PairComparison, compare
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 
 CROSSES, GOES_ROUND = "full", "floor_only"
 FAMILY = "bump"

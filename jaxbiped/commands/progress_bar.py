@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from jaxbiped.study.evaluate import Progress as Done
+from jaxbiped.study.evaluation import Progress as Done
 
 
 @contextmanager

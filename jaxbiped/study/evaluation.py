@@ -25,7 +25,7 @@ from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.batching import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.metric_columns import check_metrics, metric_columns
+from jaxbiped.study.metric_values import check_metrics, metric_columns
 from jaxbiped.study.rows import frame
 from jaxbiped.study.runner import batch_driver
 

@@ -14,7 +14,7 @@ from jaxbiped.mission.recording import FILE
 from jaxbiped.study.manifest import MANIFEST
 from jaxbiped.study.replay import mission_of, play_again
 from jaxbiped.study.stored_series import Side, Stored, check, open_stored, present
-from jaxbiped.viewer.shown import Shown, ending, shown
+from jaxbiped.viewer.mission_file import Shown, ending, shown
 
 FAILURES = 40  # of a strategy that are listed; any other can be asked for by its number
 KEPT = 8  # missions that were played last, kept

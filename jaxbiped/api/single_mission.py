@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from jaxbiped.api.register import named
+from jaxbiped.api.registration import named
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.scene import SceneConfig, load_scene, to_arena, to_terrain
 from jaxbiped.files import new_folder, write_whole

@@ -11,7 +11,7 @@ import polars as pl
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import answer
+from jaxbiped.report.answer_text import answer
 from jaxbiped.report.examples import example_section
 from jaxbiped.report.figures import write_figures
 from jaxbiped.report.page import PAGE, Section, page_of, render

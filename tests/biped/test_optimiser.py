@@ -6,7 +6,7 @@ import pytest
 from jaxbiped.biped import request as ask
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import generate, home_table
-from jaxbiped.biped.optimise import optimise
+from jaxbiped.biped.optimiser import optimise
 from jaxbiped.biped.trial import Tolerance, play
 from jaxbiped.errors import InputError
 

@@ -15,7 +15,7 @@ from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.library import PLAYED, load_library
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_logged
-from jaxbiped.mission.sampled import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
+from jaxbiped.mission.sampled_executor import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive

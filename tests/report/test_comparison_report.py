@@ -6,8 +6,8 @@ import pytest
 
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
+from jaxbiped.report.comparison_report import QUESTION_TEXT
 from jaxbiped.report.folder_report import write_report
-from jaxbiped.report.summary import QUESTION_TEXT
 from jaxbiped.study import create, store
 from tests.study.synthetic import rows
 
