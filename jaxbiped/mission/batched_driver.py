@@ -22,10 +22,10 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready
 from jaxbiped.devices import ALL, EACH, on_each, placed
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.mission_step import cycle
+from jaxbiped.mission.mission_step import step
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Mind, Planned, World, start
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState, Planned, WorldState, start
 
 SLOTS = 64  # missions at once: maps of this many arenas fit the cache of one core
 TURNS = 32  # decisions between two looks of the host at the queue
@@ -59,7 +59,7 @@ class Result:
     metrics: tuple = ()  # what each metric remembers at the end
 
 
-def ending(world: World, goal_xy: Float[Array | np.ndarray, "*N 2"]) -> Result:
+def ending(world: WorldState, goal_xy: Float[Array | np.ndarray, "*N 2"]) -> Result:
     """How missions ended whose worlds these are, in arenas with these goals."""
     away = jnp.hypot(goal_xy[..., 0] - world.pose.x, goal_xy[..., 1] - world.pose.y)
     done = world.code, world.distance, world.time, world.measurements, world.decisions
@@ -83,8 +83,8 @@ def no_results(*shape: int, metrics: tuple = ()) -> Result:
 class Queue:
     """The state between two segments of the loop."""
 
-    world: World  # [S]
-    mind: Mind  # [S]
+    world: WorldState  # [S]
+    mind: AgentState  # [S]
     job: Int[Array, "S"]  # that the slot works on; count or more: idle
     next_job: Int[Array, ""]
     result: Result
@@ -107,12 +107,17 @@ def tally(code: Int[np.ndarray, "N"]) -> Tally:
 
 
 OnProgress = Callable[[Tally], None]
-Work = Callable[[Arena, Settings, Jobs, OnProgress], Result]
+Work = Callable[[Arena, MissionParams, Jobs, OnProgress], Result]
 
 
 @with_own_settings
 def compile_queue(
-    arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int = SLOTS, mesh: Mesh | None = None
+    arenas: Arena,
+    settings: MissionParams,
+    jobs: Jobs,
+    program: MissionSpec,
+    slots: int = SLOTS,
+    mesh: Mesh | None = None,
 ) -> Work:
     """The compiled driver for arguments of these shapes.
 
@@ -149,7 +154,7 @@ def compile_queue(
     first, further = COMPILED[signature]
 
     @with_own_settings
-    def work(arenas: Arena, settings: Settings, jobs: Jobs, on_progress: OnProgress) -> Result:
+    def work(arenas: Arena, settings: MissionParams, jobs: Jobs, on_progress: OnProgress) -> Result:
         if mesh is not None:
             arenas, settings, jobs = placed(arenas, mesh, ALL), placed(settings, mesh, ALL), placed(jobs, mesh, EACH)
         count = np.asarray(jobs.count)[..., None]
@@ -193,7 +198,7 @@ def shapes(tree) -> list:
     return [(leaf.shape, str(leaf.dtype)) for leaf in jax.tree.leaves(tree)]
 
 
-def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots: int) -> Queue:
+def fill(arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpec, slots: int) -> Queue:
     """The queue with its first jobs in the slots."""
     job = jnp.arange(slots, dtype=jnp.int32)
     world, mind = begin(arenas, settings, jobs, job, program)
@@ -204,7 +209,7 @@ def fill(arenas: Arena, settings: Settings, jobs: Jobs, program: Program, slots:
     return Queue(world, mind, job, jnp.int32(slots), result)
 
 
-def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program: Program) -> Queue:
+def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpec) -> Queue:
     """Up to `TURNS` decisions of every slot."""
 
     def unfinished(carry: tuple[Array, Queue]):
@@ -215,7 +220,7 @@ def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program
         turns, queue = carry
         at = jnp.minimum(queue.job, jobs.arena.shape[0] - 1)
         arena = pick(arenas, jobs.arena[at])
-        world, mind, *_ = cycle(queue.world, queue.mind, arena, pick(settings, jobs.point[at]), program)
+        world, mind, *_ = step(queue.world, queue.mind, arena, pick(settings, jobs.point[at]), program)
         return turns + 1, advance(Queue(world, mind, queue.job, queue.next_job, queue.result), arena)
 
     def advance(queue: Queue, arena: Arena) -> Queue:
@@ -241,7 +246,9 @@ def segment(queue: Queue, arenas: Arena, settings: Settings, jobs: Jobs, program
     return jax.lax.while_loop(unfinished, turn, (jnp.int32(0), queue))[1]
 
 
-def begin(arenas: Arena, settings: Settings, jobs: Jobs, job: Int[Array, "S"], program: Program) -> tuple[World, Mind]:
+def begin(
+    arenas: Arena, settings: MissionParams, jobs: Jobs, job: Int[Array, "S"], program: MissionSpec
+) -> tuple[WorldState, AgentState]:
     """Fresh missions for the jobs of all slots; a slot without a job has one that has ended."""
     at = jnp.minimum(job, jobs.arena.shape[0] - 1)
     arena, setting = pick(arenas, jobs.arena[at]), pick(settings, jobs.point[at])

@@ -24,7 +24,7 @@ from jaxbiped.sensing.presets import PRESETS, sensor_preset
 
 if TYPE_CHECKING:
     from jaxbiped.mapping.grid import GridSpec
-    from jaxbiped.mission.settings import Settings
+    from jaxbiped.mission.settings import MissionParams
     from jaxbiped.planning.costs import Costs
 
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
@@ -185,7 +185,7 @@ class MissionConfig(Model):
         above = max(spec.levels + spec.lowest, min(grounds + HEADROOM, 32))
         return replace(spec, lowest=lowest, levels=above - lowest, ground_levels=grounds)
 
-    def settings(self, strategy: str | Strategy) -> Settings:
+    def settings(self, strategy: str | Strategy) -> MissionParams:
         """The traced part, for one strategy or the one of a name."""
         from jaxbiped.mission.settings import settings_of
 

@@ -45,7 +45,7 @@ class Executor:
     on_terrain: ClassVar[bool] = False  # it knows arenas with terrain
 
     def execute(self, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
-        """What comes of one `Command` in an `Arena`, from the `World` before it.
+        """What comes of one `Command` in an `Arena`, from the `WorldState` before it.
 
         Noise is a function of `world.seed` and `world.decisions` alone (`core` `fold`): the same for every batch.
         """

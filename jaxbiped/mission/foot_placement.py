@@ -10,8 +10,8 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped import mapping
 from jaxbiped.geometry.pose import wrap_angle
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Mind
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.edge_approach import Crossing, approach, next_crossing, remembered
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import edges
@@ -25,16 +25,16 @@ SIDEWAYS = (
 
 
 def place_feet(
-    mind: Mind,
+    mind: AgentState,
     view: View,
     command: Command,
     ij: Int[Array, "2"],
     directions: Int[Array, "n"],
     classes: Int[Array, "H W"],
     levels: Int[Array, "H W"],
-    settings: Settings,
-    program: Program,
-) -> tuple[Mind, Command]:
+    settings: MissionParams,
+    program: MissionSpec,
+) -> tuple[AgentState, Command]:
     """The command, or what it takes first for the feet to stand right before the next edge; and what is known of that.
 
     One robot. `directions` are the first `motion.edge_approach.foresight` moves of its path.
@@ -54,7 +54,9 @@ def place_feet(
     return replace(mind, ahead=ahead), command
 
 
-def look_for(about: Edge, crossing: Crossing, mind: Mind, view: View, settings: Settings, program: Program) -> Edge:
+def look_for(
+    about: Edge, crossing: Crossing, mind: AgentState, view: View, settings: MissionParams, program: MissionSpec
+) -> Edge:
     """The edge near the line `about`, as the present view has it; known only where the path crosses one.
 
     The map knows its direction but roughly, so that it is looked for along the edge behind as well: the sides of most
@@ -73,7 +75,7 @@ def look_for(about: Edge, crossing: Crossing, mind: Mind, view: View, settings: 
     return replace(seen, known=seen.known & crossing.edge.known)
 
 
-def walked(mind: Mind, command: Command, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> Mind:
+def walked(mind: AgentState, command: Command, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
     """What the robot knows of the edges about it after a command, by odometry: what was ahead may now be behind."""
     ahead, behind = (edges.predict(edge, moved, variances) for edge in (mind.ahead, mind.behind))
     stepped = command.rise != 0

@@ -13,7 +13,7 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.moving_boxes import at_time, only
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.localisation.kalman_filter import predict
-from jaxbiped.mission.decision import Thought, climbed, decide
+from jaxbiped.mission.decision import DecisionTrace, climbed, decide
 from jaxbiped.mission.execution import Execution, execution_of
 from jaxbiped.mission.foot_placement import walked
 from jaxbiped.mission.localising import carried_on, unmarked
@@ -21,8 +21,8 @@ from jaxbiped.mission.metric import Step, updated
 from jaxbiped.mission.moving_collisions import met
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.sensors import Oracle, RayCast, Standpoint, view_of
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Carriage, Mind, World
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState, BodyPose, WorldState
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import landmarks
 from jaxbiped.sensing.counter_rng import fold
@@ -32,14 +32,14 @@ SENSE = 1  # channel of a mission's seed
 TRUSTED = (RayCast, Oracle, type(None))  # sensors whose numbers are finite
 
 
-def cycle(
-    world: World,
-    mind: Mind,
+def step(
+    world: WorldState,
+    mind: AgentState,
     arena: Arena,
-    settings: Settings,
-    program: Program,
+    settings: MissionParams,
+    program: MissionSpec,
     seen: tuple[View, Sightings] | None = None,
-) -> tuple[World, Mind, View, Command, Thought]:
+) -> tuple[WorldState, AgentState, View, Command, DecisionTrace]:
     """Every mission of the batch, one decision on. Missions that have ended do not change.
 
     Consumes channels SENSE and ODOMETRY of each mission's seed, counted by its decisions.
@@ -47,9 +47,9 @@ def cycle(
     Args:
       seen: what each robot has just measured; None: measure here, by a sensor that is JAX.
     """
-    view, thinking, command, verdict, thought = think(world, mind, arena, settings, program, seen=seen)
+    view, thinking, command, verdict, thought = sense_and_decide(world, mind, arena, settings, program, seen=seen)
     executed = carry_out(arena, world, command, settings, program)
-    after, moved = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
+    after, moved = jax.vmap(apply_outcome, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, thinking, command, verdict, executed, arena, settings, program
     )
     running = world.code == Code.RUNNING
@@ -57,7 +57,9 @@ def cycle(
     return after, moved, view, command, thought
 
 
-def carry_out(arena: Arena, world: World, command: Command, settings: Settings, program: Program) -> Execution:
+def carry_out(
+    arena: Arena, world: WorldState, command: Command, settings: MissionParams, program: MissionSpec
+) -> Execution:
     """What comes of the command of each robot, among boxes that stand and boxes that move."""
     play = jax.vmap(played)
     if arena.movers is None:
@@ -67,20 +69,20 @@ def carry_out(arena: Arena, world: World, command: Command, settings: Settings, 
     return replace(executed, collided=executed.collided | run_into, fell=executed.fell & ~run_into)
 
 
-def played(arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+def played(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
     """What comes of the command of one robot."""
     return execution_of(settings.executor, arena, world, command, settings)
 
 
-def think(
-    world: World,
-    mind: Mind,
+def sense_and_decide(
+    world: WorldState,
+    mind: AgentState,
     arena: Arena,
-    settings: Settings,
-    program: Program,
-    carriage: Carriage | None = None,
+    settings: MissionParams,
+    program: MissionSpec,
+    carriage: BodyPose | None = None,
     seen: tuple[View, Sightings] | None = None,
-) -> tuple[View, Mind, Command, Int[Array, "B"], Thought]:
+) -> tuple[View, AgentState, Command, Int[Array, "B"], DecisionTrace]:
     """Sense and decide, for a batch: the view, and what `decide` returns. Consumes channel SENSE.
 
     Args:
@@ -105,7 +107,12 @@ def think(
 
 
 def sense(
-    world: World, mind: Mind, arena: Arena, settings: Settings, program: Program, carriage: Carriage | None
+    world: WorldState,
+    mind: AgentState,
+    arena: Arena,
+    settings: MissionParams,
+    program: MissionSpec,
+    carriage: BodyPose | None,
 ) -> tuple[View, Sightings]:
     """What one robot measures from where it really stands, and with its body as it really holds it."""
     pose = world.pose if carriage is None else carriage.pose
@@ -122,16 +129,16 @@ def sense(
     )
 
 
-def conclude(
-    world: World,
-    mind: Mind,
+def apply_outcome(
+    world: WorldState,
+    mind: AgentState,
     command: Command,
     verdict: Int[Array, ""],
     executed: Execution,
     arena: Arena,
-    settings: Settings,
-    program: Program,
-) -> tuple[World, Mind]:
+    settings: MissionParams,
+    program: MissionSpec,
+) -> tuple[WorldState, AgentState]:
     """One mission after its command: the robot counts its odometry, the referee looks."""
     stays = verdict != Code.RUNNING
     belief = predict(mind.belief, *executed.moved, executed.variances)
@@ -151,7 +158,7 @@ def conclude(
     astray = jnp.hypot(belief.pose.x - pose.x, belief.pose.y - pose.y)
     sane = jnp.isfinite(away + time + pose.yaw + belief.pose.x + belief.pose.y + belief.pose.yaw)
     code = jnp.where(sane, code, Code.INVALID).astype(jnp.int32)
-    after = World(
+    after = WorldState(
         pose=pose,
         squat=jnp.where(stays, world.squat, command.squat),
         distance=world.distance + jnp.where(stays, 0.0, executed.distance),

@@ -10,14 +10,16 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.moving_boxes import boxes_at, only
 from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.mission.execution import TOUCH, Execution
-from jaxbiped.mission.settings import Settings
-from jaxbiped.mission.state import World
+from jaxbiped.mission.settings import MissionParams
+from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command
 
 CHECKS = 64  # moments of a measurement and what follows it: 3 cm of an obstacle's way at 0.02 m/s and 106 s
 
 
-def met(arena: Arena, world: World, command: Command, executed: Execution, settings: Settings) -> Bool[Array, ""]:
+def met(
+    arena: Arena, world: WorldState, command: Command, executed: Execution, settings: MissionParams
+) -> Bool[Array, ""]:
     """Whether a box that moves touches one robot while it measures, or while it carries out its command.
 
     The robot is an upright cylinder of the body's radius, from a step above its ground to its head. It stands while it

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.decision import nearest_direction
 from jaxbiped.mission.route import pose_problem
-from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.motion.primitives import duration
 from jaxbiped.motion.selection import cell_of, select
 
@@ -23,8 +23,8 @@ def follow(
     levels: Int[Array, "B H W"],
     start_xyyaw: Float[Array, "B 3"],
     goal_ij: Int[Array, "B 2"],
-    settings: Settings,
-    program: Program,
+    settings: MissionParams,
+    program: MissionSpec,
     most: int = 100,
 ) -> Float[Array, "B"]:
     """The time [s] in which each robot comes to stand in its goal's cell; inf where it does not.

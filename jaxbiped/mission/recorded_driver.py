@@ -13,14 +13,14 @@ from jaxtyping import Array, Float, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.decision import Thought
+from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.log import MissionLog, Picture
-from jaxbiped.mission.mission_step import cycle
+from jaxbiped.mission.mission_step import step
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.mission.snapshots import ground, marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
-from jaxbiped.mission.state import Mind, World, start
+from jaxbiped.mission.state import AgentState, WorldState, start
 from jaxbiped.motion.primitives import Command, Primitive
 
 NAMES = {
@@ -55,11 +55,11 @@ class Mission:
     log: MissionLog = field(repr=False)
 
 
-turn_once = ready_jit(cycle, static_argnames=("program",))
+turn_once = ready_jit(step, static_argnames=("program",))
 
 
 @ready_jit(static_argnames=("program",))
-def begin_once(arena: Arena, settings: Settings, seed: UInt32[Array, ""], program: Program):
+def begin_once(arena: Arena, settings: MissionParams, seed: UInt32[Array, ""], program: MissionSpec):
     """Arena and settings with a leading axis of 1, and world and mind before the first measurement."""
     begun = start(arena, settings, seed, program.spec, program.localisation)
     return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], ((arena, settings), begun))
@@ -68,9 +68,9 @@ def begin_once(arena: Arena, settings: Settings, seed: UInt32[Array, ""], progra
 @with_own_settings
 def run_logged(
     arena: Arena,
-    settings: Settings,
+    settings: MissionParams,
     seed: UInt32[Array, ""],
-    program: Program,
+    program: MissionSpec,
     on_decision: Callable[[Played], None] = lambda _: None,
     eyes: Eyes | None = None,
 ) -> Mission:
@@ -86,12 +86,12 @@ def run_logged(
 @with_own_settings
 def run_bare(
     arena: Arena,
-    settings: Settings,
+    settings: MissionParams,
     seed: UInt32[Array, ""],
-    program: Program,
+    program: MissionSpec,
     eyes: Eyes | None = None,
     recorder: Recorder | None = None,
-) -> World:
+) -> WorldState:
     """The end of one mission (no batch axis); its world has a leading axis of 1."""
     batch, (world, mind) = begin_once(arena, settings, seed, program)
     while np.asarray(world.code)[0] == Code.RUNNING:
@@ -108,7 +108,11 @@ class Recorder:
     """Keeps what one mission saw and thought; worlds, minds and so on have a leading axis of 1."""
 
     def __init__(
-        self, settings: Settings, program: Program, on_decision: Callable[[Played], None], eyes: Eyes | None = None
+        self,
+        settings: MissionParams,
+        program: MissionSpec,
+        on_decision: Callable[[Played], None],
+        eyes: Eyes | None = None,
     ):
         self.settings, self.program, self.on_decision, self.eyes = settings, program, on_decision, eyes
         self.moments: list[dict] = []
@@ -116,9 +120,9 @@ class Recorder:
         self.played: list[Played] = []
         self.walked: list[list[np.ndarray]] = []  # states of a simulated biped, after each decision
         self.action = "Start"
-        self.end: World | None = None
+        self.end: WorldState | None = None
 
-    def decided(self, _: int, world: World, command: Command, thought: Thought) -> None:
+    def decided(self, _: int, world: WorldState, command: Command, thought: DecisionTrace) -> None:
         """One decision, before it is carried out."""
         self.moments.append(moment(world, thought, self.settings, self.program, self.action))
         if shot := self.eyes and self.eyes.picture():
@@ -131,7 +135,7 @@ class Recorder:
         if self.walked:
             self.walked[-1].append(qpos.astype(np.float32))
 
-    def concluded(self, _: int, world: World, mind: Mind) -> None:
+    def concluded(self, _: int, world: WorldState, mind: AgentState) -> None:
         """What came of it."""
         command, world = jax.device_get((self.command, world))
         record = Played(
@@ -145,7 +149,7 @@ class Recorder:
         self.action = record.name if record.length or not record.turn else "Turn-direction"
         self.end, self.mind = world, mind
 
-    def mission(self, arena: Arena, world: World) -> Mission:
+    def mission(self, arena: Arena, world: WorldState) -> Mission:
         """The whole of it.
 
         Args:

@@ -12,8 +12,8 @@ from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.mission.contact_rules import body_touches, edges, feet_touch, off_ground
 from jaxbiped.mission.execution import ODOMETRY, PLAY, Execution
 from jaxbiped.mission.library import PLAYED, Library
-from jaxbiped.mission.settings import Settings
-from jaxbiped.mission.state import World
+from jaxbiped.mission.settings import MissionParams
+from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.counter_rng import fold
@@ -23,7 +23,7 @@ STRAIGHT, TURN, UP, DOWN, SQUAT, SIDE = range(len(PLAYED))
 WAY = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
 
 
-def sampled(arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+def sampled(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
     """Displacements, falls and stops as measured in simulation (`settings.library`); time is Table 2's.
 
     Turn, step to the side and primitive are drawn one after the other. Each ends where it was asked to, but for the

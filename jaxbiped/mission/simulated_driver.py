@@ -28,12 +28,12 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridSpec
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, ending, no_results, tally
-from jaxbiped.mission.decision import Thought
+from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.primitive_schedule import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
 from jaxbiped.mission.recorded_driver import Mission, Played, Recorder
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.simulated_step import (
     Plan,
     choose_rows,
@@ -46,7 +46,7 @@ from jaxbiped.mission.simulated_step import (
     think_on,
 )
 from jaxbiped.mission.stage import Stage
-from jaxbiped.mission.state import Carriage, Mind, World, start
+from jaxbiped.mission.state import AgentState, BodyPose, WorldState, start
 from jaxbiped.motion.primitives import CELL, Command, Primitive
 
 SLICE = 32  # steps (0.16 s) between two looks at who is done
@@ -60,9 +60,9 @@ ROWS = 8  # robots that decide in one call: the same program, whatever the numbe
 class Observer(Protocol):
     """Is told of missions as they go; all pytrees have a leading axis of 1."""
 
-    def decided(self, job: int, world: World, command: Command, thought: Thought, /) -> None: ...
+    def decided(self, job: int, world: WorldState, command: Command, thought: DecisionTrace, /) -> None: ...
 
-    def concluded(self, job: int, world: World, mind: Mind, /) -> None: ...
+    def concluded(self, job: int, world: WorldState, mind: AgentState, /) -> None: ...
 
     def moved(self, job: int, qpos: Float[np.ndarray, "nq"], /) -> None: ...
 
@@ -70,9 +70,9 @@ class Observer(Protocol):
 @with_own_settings
 def walk(
     arenas: Arena,
-    settings: Settings,
+    settings: MissionParams,
     jobs: Jobs,
-    program: Program,
+    program: MissionSpec,
     config: WalkConfig,
     on_progress: OnProgress = lambda tally: None,
     observer: Observer | None = None,
@@ -98,9 +98,9 @@ def walk(
 @with_own_settings
 def walk_logged(
     arena: Arena,
-    settings: Settings,
+    settings: MissionParams,
     seed: UInt32[Array, ""],
-    program: Program,
+    program: MissionSpec,
     config: WalkConfig,
     on_decision: Callable[[Played], None] = lambda _: None,
     eyes: Eyes | None = None,
@@ -143,7 +143,7 @@ def rehearse(config: MissionConfig) -> None:
 class Walkers:
     """The slots, and the queue that they work off."""
 
-    def __init__(self, arenas, settings, jobs, program: Program, config: WalkConfig, observer=None, eyes=None):
+    def __init__(self, arenas, settings, jobs, program: MissionSpec, config: WalkConfig, observer=None, eyes=None):
         self.arenas, self.settings, self.jobs = arenas, settings, jobs
         self.program, self.config, self.observer, self.eyes = program, config, observer, eyes
         self.arena_of, self.point_of = np.asarray(jobs.arena), np.asarray(jobs.point)
@@ -194,7 +194,7 @@ class Walkers:
         stands = self.stage.stands(ids, self.squat[ids])
         rows = np.resize(ids, ROWS)
         feet, body = (jnp.asarray(np.resize(v, (ROWS, v.shape[1])).T, jnp.float32) for v in (stands.feet, stands.body))
-        carriage = Carriage(Pose(*body[:4]), body[4], body[5])
+        carriage = BodyPose(Pose(*body[:4]), body[4], body[5])
         world, mind, plan = gather((self.world, self.mind, self.plan), rows)
         arena = gather(self.arenas, self.arena_of[self.job[rows]])
         setting = gather(self.settings, self.point_of[self.job[rows]])
@@ -247,7 +247,7 @@ class Walkers:
         self.place[s] = 0
         self.length[s] = len(self.tapes[s]) + round(SETTLE / TIMESTEP) if tables else 0
 
-    def write(self, s: int | np.integer, world: World) -> None:
+    def write(self, s: int | np.integer, world: WorldState) -> None:
         """Write down how the mission of a slot ended."""
         job = self.job[s]
         worked = np.float32(self.stage.work[s])
@@ -274,7 +274,9 @@ class Walkers:
         for s in np.flatnonzero(mask):
             self.lay(s, [self.stage.rest(False)], False)
 
-    def tell(self, ids, plan: Plan, world: World, moved: Mind, following: Plan, thought: Thought) -> None:
+    def tell(
+        self, ids, plan: Plan, world: WorldState, moved: AgentState, following: Plan, thought: DecisionTrace
+    ) -> None:
         """Tell the observer."""
         for k, s in enumerate(ids):
             job = int(self.job[s])

@@ -13,12 +13,12 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.batched_driver import Jobs, begin, pick
-from jaxbiped.mission.decision import Thought
+from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.executors import ODOMETRY, Execution
-from jaxbiped.mission.mission_step import conclude, think
+from jaxbiped.mission.mission_step import apply_outcome, sense_and_decide
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Carriage, Mind, World
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState, BodyPose, WorldState
 from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.sensing.counter_rng import fold
@@ -67,24 +67,26 @@ def choose_rows(mask: Bool[Array, "S"], new, old):
 
 
 @partial(jax.jit, static_argnames=("program",))
-def fresh(arenas: Arena, settings: Settings, jobs: Jobs, job: Int[Array, "S"], program: Program) -> tuple[World, Mind]:
+def fresh(
+    arenas: Arena, settings: MissionParams, jobs: Jobs, job: Int[Array, "S"], program: MissionSpec
+) -> tuple[WorldState, AgentState]:
     """See `batched_driver.begin`."""
     return begin(arenas, settings, jobs, job, program)
 
 
 @partial(jax.jit, static_argnames=("program",))
 def judge_and_think(
-    world: World,
-    mind: Mind,
+    world: WorldState,
+    mind: AgentState,
     plan: Plan,
     after: Pose,
-    carriage: Carriage,
+    carriage: BodyPose,
     fell: Bool[Array, "n"],
     collided: Bool[Array, "n"],
     arena: Arena,
-    settings: Settings,
-    program: Program,
-) -> tuple[World, Mind, Mind, Plan, Thought]:
+    settings: MissionParams,
+    program: MissionSpec,
+) -> tuple[WorldState, AgentState, AgentState, Plan, DecisionTrace]:
     """The referee looks at what came of each robot's plan, and each robot makes its next one.
 
     Returns:
@@ -96,16 +98,16 @@ def judge_and_think(
 
 @partial(jax.jit, static_argnames=("program",))
 def judge(
-    world: World,
-    mind: Mind,
+    world: WorldState,
+    mind: AgentState,
     plan: Plan,
     after: Pose,
     fell: Bool[Array, "n"],
     collided: Bool[Array, "n"],
     arena: Arena,
-    settings: Settings,
-    program: Program,
-) -> tuple[World, Mind, Int[Array, "n"]]:
+    settings: MissionParams,
+    program: MissionSpec,
+) -> tuple[WorldState, AgentState, Int[Array, "n"]]:
     """The referee looks at what came of each robot's plan.
 
     Deviation: the paper's robot knows nothing but what it sees. Here, feet that were stopped `PATIENCE` times in a row,
@@ -115,7 +117,7 @@ def judge(
       The world and the mind after what was done; how many commands in a row something was in the way of.
     """
     executed = jax.vmap(carried_out)(world, plan.command, after, fell, collided, arena, settings)
-    done = jax.vmap(conclude, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
+    done = jax.vmap(apply_outcome, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, mind, plan.command, plan.verdict, executed, arena, settings, program
     )
     times = jnp.where(plan.some & hindered(plan.command, executed.moved), plan.hindered + 1, 0)
@@ -126,21 +128,21 @@ def judge(
 
 @partial(jax.jit, static_argnames=("program",))
 def think_on(
-    world: World,
-    mind: Mind,
+    world: WorldState,
+    mind: AgentState,
     times: Int[Array, "n"],
-    carriage: Carriage,
+    carriage: BodyPose,
     arena: Arena,
-    settings: Settings,
-    program: Program,
+    settings: MissionParams,
+    program: MissionSpec,
     seen: tuple[View, Sightings] | None = None,
-) -> tuple[Mind, Plan, Thought]:
+) -> tuple[AgentState, Plan, DecisionTrace]:
     """Each robot measures, or has `seen`, and makes its next plan; `times` is what `judge` returned.
 
     Returns:
       The mind after the measurement; the plan; the thought.
     """
-    _, thinking, command, verdict, thought = think(world, mind, arena, settings, program, carriage, seen)
+    _, thinking, command, verdict, thought = sense_and_decide(world, mind, arena, settings, program, carriage, seen)
     stuck = times >= PATIENCE
     command = choose_rows(stuck & (verdict == Code.RUNNING), back_off(command), command)
     return thinking, Plan(command, verdict, jnp.ones_like(stuck), jnp.where(stuck, 0, times)), thought
@@ -158,7 +160,7 @@ def hindered(command: Command, moved: Float[Array, "n 3"]) -> Bool[Array, "n"]:
     return ((off > HINDERED) | (astray > TWISTED)) & (command.rise == 0) & (command.length >= 0)
 
 
-def feel(mind: Mind, before: Pose, command: Command, spec: GridSpec) -> Mind:
+def feel(mind: AgentState, before: Pose, command: Command, spec: GridSpec) -> AgentState:
     """Write an obstacle into the map of one robot, at the cell where feet that were hindered should have come to stand.
 
     If it stands in that cell, then at the cell behind it.
@@ -187,13 +189,13 @@ def back_off(command: Command) -> Command:
 
 
 def carried_out(
-    world: World,
+    world: WorldState,
     command: Command,
     after: Pose,
     fell: Bool[Array, ""],
     collided: Bool[Array, ""],
     arena: Arena,
-    settings: Settings,
+    settings: MissionParams,
 ) -> Execution:
     """What came of a command, from where the engine says that the robot stands after it.
 

@@ -13,13 +13,15 @@ from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.geometry.pose import to_world
 from jaxbiped.mapping import level_view
 from jaxbiped.mapping.cobstacles import occupied_levels
-from jaxbiped.mission.decision import Thought
+from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.log import Ground, Mark, Outline, Walk
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import World
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import WorldState
 
 
-def moment(world: World, thought: Thought, settings: Settings, program: Program, action: str) -> dict:
+def moment(
+    world: WorldState, thought: DecisionTrace, settings: MissionParams, program: MissionSpec, action: str
+) -> dict:
     """What a log keeps of one decision."""
     points, counts, voxels = jax.device_get(as_mapped(thought, settings, program))
     plan = planned_way(thought, settings, program)
@@ -42,7 +44,7 @@ def moment(world: World, thought: Thought, settings: Settings, program: Program,
 
 @ready_jit(static_argnames=("program",))
 def as_mapped(
-    thought: Thought, settings: Settings, program: Program
+    thought: DecisionTrace, settings: MissionParams, program: MissionSpec
 ) -> tuple[Float[Array, "N 3"], Bool[Array, "N"], Bool[Array, "H W Z"]]:
     """The points of a view as the map takes them [m, world as believed], which of them count, and occupied voxels."""
     spec, mapping = program.spec, settings.mapping
@@ -64,7 +66,7 @@ def walk_of(walked: list[list[np.ndarray]]) -> Walk | None:
     return Walk(np.stack(states), np.concatenate(moment).astype(np.float32))
 
 
-def nothing(world: World, program: Program) -> dict:
+def nothing(world: WorldState, program: MissionSpec) -> dict:
     """The one moment of a mission that ended before it began."""
     blank = np.zeros(program.spec.shape, np.int8)
     here = pose_of(world)
@@ -84,7 +86,7 @@ def nothing(world: World, program: Program) -> dict:
     }
 
 
-def pose_of(world: World) -> Float[np.ndarray, "3"]:
+def pose_of(world: WorldState) -> Float[np.ndarray, "3"]:
     """True (x, y, yaw) of the only mission of a batch."""
     return np.array([float(np.asarray(v)[0]) for v in (world.pose.x, world.pose.y, world.pose.yaw)])
 
@@ -95,7 +97,7 @@ def mind_pose(mind) -> Float[np.ndarray, "3"]:
     return np.array([float(np.asarray(v)[0]) for v in (pose.x, pose.y, pose.yaw)])
 
 
-def planned_way(thought: Thought, settings: Settings, program: Program) -> Float[np.ndarray, "n 2"]:
+def planned_way(thought: DecisionTrace, settings: MissionParams, program: MissionSpec) -> Float[np.ndarray, "n 2"]:
     """Cell centres [m] of the planned path, from the robot's cell on; empty where there is none."""
     spec = program.spec
     moves = np.asarray(way(thought, settings))[0]
@@ -109,7 +111,7 @@ def planned_way(thought: Thought, settings: Settings, program: Program) -> Float
 
 
 @ready_jit
-def way(thought: Thought, settings: Settings):
+def way(thought: DecisionTrace, settings: MissionParams):
     """Moves of the planned path, of which `decide` reads the first."""
     return settings.planner.whole_way(thought.problem, thought.route)
 

@@ -6,10 +6,10 @@ from jaxbiped.arenas.ground import WITH_TERRAIN, no_terrain_for
 from jaxbiped.geometry.height_field import HeightField
 from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.sensors import find_sensor
-from jaxbiped.mission.settings import MissionConfig, Program, program
+from jaxbiped.mission.settings import MissionConfig, MissionSpec, program
 
 
-def program_for(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None) -> Program:
+def program_for(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None) -> MissionSpec:
     """See `settings.program`.
 
     Raises:

@@ -20,7 +20,7 @@ from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.metric import Metric, column_of, find_metric
 from jaxbiped.mission.primitive_schedule import WalkConfig
 from jaxbiped.mission.sensors import find_sensor
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.mission.terrain_check import program_for
 from jaxbiped.sensing.camera import CameraConfig
@@ -45,12 +45,12 @@ class Group:
     """Points and strategies that differ in traced numbers alone: `P` points, `S` strategies, one compiled program."""
 
     kind: ArenaKind
-    static: Program
+    static: MissionSpec
     walk: WalkConfig | None  # of simulated bipeds
     camera: CameraConfig | None  # of sensors that measure on the host
     points: tuple[int, ...]  # indices of the points, rising
     strategies: tuple[str, ...]  # their names
-    settings: Settings  # [P * S], strategy by strategy within a point
+    settings: MissionParams  # [P * S], strategy by strategy within a point
     populations: Population | None  # [U], those that differ; None: nothing is fixed in any
     population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
     metrics: tuple[str, ...] = ()  # columns of the metrics of the settings
@@ -193,7 +193,7 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
 
 def group(
     kind: ArenaKind,
-    static: Program,
+    static: MissionSpec,
     walk: WalkConfig | None,
     camera: CameraConfig | None,
     points: Sequence[Point],

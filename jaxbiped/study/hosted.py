@@ -19,7 +19,7 @@ from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_bare
-from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.sensing.camera import CameraConfig
 
 
@@ -27,9 +27,9 @@ from jaxbiped.sensing.camera import CameraConfig
 def run_on_host(
     batch: Arena,
     seeds: UInt32[Array, "A"],
-    points: Settings,
+    points: MissionParams,
     count: int,
-    static: Program,
+    static: MissionSpec,
     on_progress: OnProgress,
     open_eyes: Callable[[], AbstractContextManager[Eyes]],
     population_of: Int[np.ndarray, "P"],

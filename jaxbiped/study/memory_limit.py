@@ -8,7 +8,7 @@ from pathlib import Path
 
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import SLOTS
-from jaxbiped.mission.settings import Program
+from jaxbiped.mission.settings import MissionSpec
 
 # Bytes, measured as growth of the resident memory, and rounded up.
 POINT = 25_000  # a sweep point: its config
@@ -31,14 +31,14 @@ def most_points(strategies: int) -> int:
     return memory() // (POINT + strategies * (SETTING + ROW))
 
 
-def map_bytes(static: Program, workers: int) -> int:
+def map_bytes(static: MissionSpec, workers: int) -> int:
     """Bytes of the maps of all slots."""
     height, width = static.spec.shape
     layers = static.spec.levels + 4 + static.spec.ground_levels
     return 4 * height * width * layers * SLOTS * workers * MAPS
 
 
-def check_memory(static: Program, points: int, strategies: int, arenas: int, workers: int) -> None:
+def check_memory(static: MissionSpec, points: int, strategies: int, arenas: int, workers: int) -> None:
     """Raise `InputError` when a shard of `arenas` under `points` does not fit, with what would.
 
     Args:

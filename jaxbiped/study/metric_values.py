@@ -15,7 +15,7 @@ from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import Result, no_results
 from jaxbiped.mission.metric import MissionEnd, begun, numbers_at_end
 from jaxbiped.mission.oracle import OraclePlan
-from jaxbiped.mission.settings import Settings
+from jaxbiped.mission.settings import MissionParams
 from jaxbiped.study.batching import Group
 
 
@@ -84,10 +84,10 @@ CHECKED: set = set()  # structures and shapes that have been looked at
 
 
 @ready_jit
-def at_ends(arenas: Arena, settings: Settings, results: Result, plans: OraclePlan) -> tuple:
+def at_ends(arenas: Arena, settings: MissionParams, results: Result, plans: OraclePlan) -> tuple:
     """(value, valid) [P, A] of each metric."""
 
-    def one(arena: Arena, setting: Settings, result: Result, plan: OraclePlan) -> tuple:
+    def one(arena: Arena, setting: MissionParams, result: Result, plan: OraclePlan) -> tuple:
         return numbers_at_end(setting.metrics, result.metrics, MissionEnd(arena, result, plan, setting))
 
     over_arenas = jax.vmap(one, in_axes=(0, None, 0, 0))

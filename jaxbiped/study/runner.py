@@ -17,7 +17,7 @@ from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.mission.batched_driver import Result
 from jaxbiped.mission.eyes import Eyes, eyes_for
 from jaxbiped.mission.recorded_driver import Mission, Played, run_logged
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.mission.terrain_check import program_for
 from jaxbiped.sensing.counter_rng import from_key
@@ -35,7 +35,7 @@ def noise_of_word(seed: UInt32[Array, ""]) -> UInt32[Array, ""]:
     return from_key(jax.random.key(seed))
 
 
-def program_of(config: MissionConfig, arena: Arena) -> Program:
+def program_of(config: MissionConfig, arena: Arena) -> MissionSpec:
     """The static part of missions in one arena; see `terrain_check.program_for`."""
     return program_for(config, tuple(round(float(side), 6) for side in np.asarray(arena.size_xy)), arena.terrain)
 
@@ -91,7 +91,7 @@ def play_one(
     return run_logged(*arguments, on_decision=on_decision, eyes=eyes)
 
 
-def numbered(settings: Settings, strategy: str | Strategy, numbers: Mapping[str, float]) -> Settings:
+def numbered(settings: MissionParams, strategy: str | Strategy, numbers: Mapping[str, float]) -> MissionParams:
     """Settings of a strategy with other numbers of its components."""
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
     changed = {"sensor": settings.sensor, "executor": settings.executor, "planner": strategy.planner}

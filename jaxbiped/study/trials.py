@@ -19,7 +19,7 @@ from jaxbiped.devices import cores
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig, Settings, program
+from jaxbiped.mission.settings import MissionConfig, MissionParams, program
 from jaxbiped.planning import Costs
 from jaxbiped.study.evaluation import draw
 
@@ -65,7 +65,7 @@ class Trials:
             if stop.is_set():
                 raise InterruptedError
 
-        def deal(piece: tuple[int, int]) -> tuple[Work, tuple[Arena, Settings, Jobs], tuple[slice, slice]]:
+        def deal(piece: tuple[int, int]) -> tuple[Work, tuple[Arena, MissionParams, Jobs], tuple[slice, slice]]:
             first, vector = piece
             here, vectors = index[first : first + BLOCK], costs[vector : vector + VECTORS]
             batch, seeds = draw(key, jnp.asarray(np.resize(here, BLOCK)), self.families)

@@ -12,7 +12,7 @@ from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result
 from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.primitive_schedule import WalkConfig
-from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.mission.simulated_driver import walk
 
 
@@ -20,9 +20,9 @@ from jaxbiped.mission.simulated_driver import walk
 def walk_all(
     batch: Arena,
     seeds: UInt32[Array, "A"],
-    points: Settings,
+    points: MissionParams,
     count: int,
-    static: Program,
+    static: MissionSpec,
     on_progress: OnProgress,
     config: WalkConfig,
     population_of: Int[np.ndarray, "P"],

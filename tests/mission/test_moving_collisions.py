@@ -13,7 +13,7 @@ from jaxbiped.mission.execution import Execution
 from jaxbiped.mission.moving_collisions import CHECKS, met
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.state import Planned, World
+from jaxbiped.mission.state import Planned, WorldState
 from jaxbiped.motion.primitives import Command
 from tests.sensing.scenes import SLOTS, make
 
@@ -36,7 +36,7 @@ def situation(way, speed, walk, time=0.0, top=0.5, bottom=0.0, duration=16.0, sq
     zero, whole, no = jnp.zeros(()), jnp.zeros((), jnp.int32), jnp.zeros((), bool)
     before, after = (Pose(jnp.float32(x), jnp.float32(y), zero, zero) for x, y in walk)
     code = jnp.int32(Code.RUNNING)
-    world = World(
+    world = WorldState(
         before, no, zero, jnp.float32(time), whole, whole, code, jnp.uint32(0), zero, zero, Planned(zero, whole, zero)
     )
     command = Command(turn=zero, primitive=whole, length=zero, rise=whole, squat=jnp.array(squat), left=zero)

@@ -8,7 +8,7 @@ from jaxbiped.localisation.kalman_filter import Belief
 from jaxbiped.mapping import Cell, GridSpec, classify, empty
 from jaxbiped.mapping.params import MapConfig
 from jaxbiped.mission.simulated_step import BACK, back_off, feel, hindered
-from jaxbiped.mission.state import Mind
+from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.primitives import Command
 
 SPEC = GridSpec(size_x=0.6, size_y=0.45)
@@ -48,11 +48,11 @@ def test_what_was_felt_is_an_obstacle_ahead():
 
 def felt_at(pose, length):
     """The mind of a robot at `pose` after its feet were stopped."""
-    mind = Mind(belief=Belief(pose, jnp.eye(3)), grid_map=empty(SPEC), **dict.fromkeys(BARE))
+    mind = AgentState(belief=Belief(pose, jnp.eye(3)), grid_map=empty(SPEC), **dict.fromkeys(BARE))
     return feel(mind, pose, Command(*(leaf[0] for leaf in vars(command(length=length)).values())), SPEC)
 
 
-BARE = set(Mind.__dataclass_fields__) - {"belief", "grid_map"}
+BARE = set(AgentState.__dataclass_fields__) - {"belief", "grid_map"}
 
 
 def test_backing_off_goes_straight_back():
