@@ -24,8 +24,9 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Cell, GridSpec, truth_grid
 from jaxbiped.mapping.floor import find_floor
 from jaxbiped.mapping.scan_map import ONE_LOOK, make_chart
-from jaxbiped.motion.robot import RobotConfig
-from jaxbiped.sensing.camera import CameraConfig, mount, placed
+from jaxbiped.motion.config import RobotConfig
+from jaxbiped.sensing.camera import mount, placed
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo import MatchParams, ideal, match, to_points
 from jaxbiped.stereo.matching import grey, search
 from jaxbiped.stereo.points import useful_range

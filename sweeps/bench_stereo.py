@@ -28,7 +28,7 @@ from jaxbiped.localisation.kalman_filter import Belief, correct
 from jaxbiped.mapping import Cell
 from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.stereo import landmarks, matching
 from jaxbiped.stereo.fit import quality, together

@@ -37,7 +37,7 @@ from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.plan_rollout import follow
 from jaxbiped.mission.route import pose_problem
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.motion.primitives import DurationConfig
+from jaxbiped.motion.config import DurationConfig
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
 from jaxbiped.statistics.intervals import mean_and_median, proportion

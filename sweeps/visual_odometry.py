@@ -23,8 +23,9 @@ from rich.table import Table
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.camera import mount, placed
+from jaxbiped.sensing.config import VisualConfig
 from jaxbiped.sensing.counter_rng import fold
-from jaxbiped.sensing.motion import SHARE, VisualConfig, overlap
+from jaxbiped.sensing.motion import SHARE, overlap
 from jaxbiped.sensing.noise import attitude_error
 from jaxbiped.sensing.view import View
 from jaxbiped.stereo.matching import grey

@@ -10,7 +10,7 @@ from typing import Any
 import pydantic
 
 from jaxbiped.api.registration import family_name, named, register
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.arenas.source import Family
 from jaxbiped.config import input_error
 from jaxbiped.core.names import METRICS

@@ -7,7 +7,8 @@ import math
 from dataclasses import dataclass
 
 from jaxbiped.errors import InputError
-from jaxbiped.motion.config import CELL, EIGHTH, DurationConfig
+from jaxbiped.motion.config import DurationConfig
+from jaxbiped.motion.grid_units import CELL, EIGHTH
 
 LONGEST, WIDEST, SHARPEST = 0.0708, 0.04, math.radians(22.6)  # [m, m, rad] of one pair of steps
 PAIRS = 6  # most pairs of steps in one primitive

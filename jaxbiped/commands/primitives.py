@@ -28,7 +28,7 @@ from jaxbiped.commands.options.primitives import PrimitivesArgs
 from jaxbiped.config import config_hash, load
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 from jaxbiped.report.library_file import library, library_text
 from jaxbiped.report.primitives import markdown, save_windows, terminal
 from jaxbiped.report.video import save_primitive

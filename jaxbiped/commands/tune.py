@@ -20,7 +20,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.library import load_library
 from jaxbiped.mission.settings import program
-from jaxbiped.motion.primitives import DurationConfig
+from jaxbiped.motion.config import DurationConfig
 from jaxbiped.report.tables import to_markdown, to_rich
 from jaxbiped.report.tuning import costs_sheet, costs_toml, fits_sheet, gaps_sheet, missions, sentence, write_tuning
 from jaxbiped.study import store

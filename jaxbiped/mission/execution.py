@@ -15,7 +15,7 @@ from jaxbiped.core.registry import EXECUTORS
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.config import SIMULATED
-from jaxbiped.motion.robot import STEP_TOLERANCE
+from jaxbiped.motion.config import STEP_TOLERANCE
 
 CHECKS = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
 TOUCH = STEP_TOLERANCE  # [m] contact that counts as none: rounding, and boxes that just end at a height

@@ -16,7 +16,8 @@ from jaxbiped.mission.config import RENDERED as RENDERED
 from jaxbiped.mission.mission_step import SENSE
 from jaxbiped.mission.settings import VISUAL, MissionConfig, MissionParams
 from jaxbiped.mission.state import AgentState, BodyPose, WorldState
-from jaxbiped.sensing.camera import CameraConfig, Mount, mount, placed
+from jaxbiped.sensing.camera import Mount, mount, placed
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.noise import attitude_error
 from jaxbiped.sensing.shot import Shot

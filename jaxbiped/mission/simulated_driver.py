@@ -47,7 +47,8 @@ from jaxbiped.mission.simulated_step import (
 )
 from jaxbiped.mission.stage import Stage
 from jaxbiped.mission.state import AgentState, BodyPose, WorldState, start
-from jaxbiped.motion.primitives import CELL, Command, Primitive
+from jaxbiped.motion.grid_units import CELL
+from jaxbiped.motion.primitives import Command, Primitive
 
 SLICE = 32  # steps (0.16 s) between two looks at who is done
 SETTLE = 0.3  # [s] that a robot stands before it measures

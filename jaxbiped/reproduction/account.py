@@ -11,7 +11,9 @@ import numpy as np
 from jaxbiped.biped.primitive_catalogue import PAPER
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import NAMES, Mission
-from jaxbiped.motion.primitives import CELL, EIGHTH, DurationConfig, Primitive
+from jaxbiped.motion.config import DurationConfig
+from jaxbiped.motion.grid_units import CELL, EIGHTH
+from jaxbiped.motion.primitives import Primitive
 from jaxbiped.reproduction.paper import Experiment
 
 STRAIGHT, OBLIQUE, ASIDE = "straight", "oblique", "aside and back"

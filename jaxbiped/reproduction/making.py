@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from jaxbiped.mapping import GridSpec
 from jaxbiped.mapping.cobstacles import dilate
 from jaxbiped.mission.log import MissionLog, Picture
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 from jaxbiped.report.animation import disparity_image
 from jaxbiped.report.examples import picture
 from jaxbiped.report.measured import screen, voxel_figure

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from jaxbiped.motion.primitives import CELL, DurationConfig
+from jaxbiped.motion.config import DurationConfig
+from jaxbiped.motion.grid_units import CELL
 
 TABLE_2 = DurationConfig()  # whose defaults are Table 2
 GOAL_RADIUS = 0.10  # [m] (paper, 3.1)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import ScalarFormatter
 
-from jaxbiped.motion.primitives import CELL
+from jaxbiped.motion.grid_units import CELL
 from jaxbiped.report.answer_text import DISTANCE, TIME, Measure
 from jaxbiped.report.figures import canvas, style
 from jaxbiped.report.grid import to_grid

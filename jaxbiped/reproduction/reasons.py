@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from jaxbiped.motion.primitives import CELL
+from jaxbiped.motion.grid_units import CELL
 from jaxbiped.report.words import signed
 from jaxbiped.reproduction.account import (
     ASIDE,

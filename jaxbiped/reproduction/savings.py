@@ -12,7 +12,7 @@ import polars as pl
 from jaxtyping import Int
 
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.motion.primitives import CELL
+from jaxbiped.motion.grid_units import CELL
 from jaxbiped.reproduction.paper import TABLE_2
 from jaxbiped.statistics.comparison import ALL, Comparison, PairComparison, compare
 from jaxbiped.study.config import StudyConfig

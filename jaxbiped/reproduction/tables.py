@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from jaxbiped.motion.primitives import CELL
+from jaxbiped.motion.grid_units import CELL
 from jaxbiped.report.tables import Row, Sheet
 from jaxbiped.report.words import NONE, number, signed
 from jaxbiped.reproduction.account import KINDS, MEASURE, Measuring, Record

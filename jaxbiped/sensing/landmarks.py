@@ -23,13 +23,10 @@ from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.geometry.rays import cast_boxes, key, nearness
 from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec, check_camera, mount, placed
-from jaxbiped.sensing.config import LandmarkConfig as LandmarkConfig
-from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.sensing.view import Sightings
 
 LANDMARK = 4  # channel of a view's seed
 HIDDEN_MARGIN = 1e-3  # relative: a box, or the ground, that only touches the landmark does not hide it
-RENDERED, IDEAL, REAL = (PRESETS[name].landmarks for name in ("rendered", "ideal", "real"))
 
 
 @jax.tree_util.register_dataclass

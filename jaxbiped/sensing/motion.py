@@ -17,7 +17,6 @@ from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
-from jaxbiped.sensing.config import VisualConfig as VisualConfig
 from jaxbiped.sensing.view import Motion, View
 
 VISUAL = 6  # channel of a view's seed

@@ -20,14 +20,11 @@ from jaxtyping import Array, Bool, Float, UInt32
 
 from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec
-from jaxbiped.sensing.config import NoiseConfig as NoiseConfig
-from jaxbiped.sensing.presets import PRESETS
 
 MATCH, PHANTOM, ATTITUDE = 1, 2, 3  # channels of a view's seed
 HIDING_REACH = 128  # [px] how far to the right of a pixel something may hide it
 PHANTOM_BLOCK = 12  # [px] size of a clump of phantoms
 LEAST_WIDTH = 1e-2  # [px] in the right image, of one in the left: what turns away further is seen by none
-RENDERED, IDEAL, REAL = (PRESETS[name].stereo for name in ("rendered", "ideal", "real"))
 
 
 @jax.tree_util.register_dataclass

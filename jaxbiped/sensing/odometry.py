@@ -19,7 +19,6 @@ from jaxtyping import Array, Float, UInt32
 from jaxbiped.core.checks import finite
 from jaxbiped.core.signatures import checked
 from jaxbiped.sensing import counter_rng
-from jaxbiped.sensing.config import OdometryConfig as OdometryConfig
 
 ODOMETRY = 5  # channel of a step's seed
 

@@ -14,7 +14,7 @@ from jaxbiped.config import Model
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 Baseline = Annotated[float, Field(ge=0.001, le=2.0)]  # [m]; beyond, the file is in other units

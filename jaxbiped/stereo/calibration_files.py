@@ -12,7 +12,7 @@ import numpy as np
 from jaxbiped.config import load_toml, parse
 from jaxbiped.errors import InputError
 from jaxbiped.files import read_text
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo.calibration import PoseConfig, RawConfig, RectifiedConfig, ideal
 from jaxbiped.stereo.lens_model import check_camera_matrix, check_lens_model
 from jaxbiped.stereo.rectify import Rig, make_rig

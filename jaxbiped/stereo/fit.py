@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from jaxbiped.sensing.noise import LEAST_WIDTH, NoiseConfig
+from jaxbiped.sensing.config import NoiseConfig
+from jaxbiped.sensing.noise import LEAST_WIDTH
 from jaxbiped.stereo.measure import StereoSensor
 
 LAG = 8  # [px] over which slopes and edges are told: from a ray to the next

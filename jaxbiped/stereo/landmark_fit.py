@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE
-from jaxbiped.sensing.landmarks import LandmarkConfig
+from jaxbiped.sensing.config import LandmarkConfig
 
 LEAST_SD, LEAST_PER_METRE = 0.0003, 0.0001  # [m], [m/m] that no model goes below: a print is not better than that
 BINS = 6  # of range, in each of which errors are summed up

@@ -9,7 +9,8 @@ from jaxtyping import Float
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import refuse_terrain
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.sensing.camera import CameraConfig, Mount
+from jaxbiped.sensing.camera import Mount
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.landmarks import LandmarkNoise
 from jaxbiped.sensing.shot import Shot
 from jaxbiped.sensing.view import Sightings, View

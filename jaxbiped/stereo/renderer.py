@@ -14,7 +14,7 @@ from jaxtyping import Float, Float32, UInt8
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.errors import InputError
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo.scene import arena_model
 
 NEAR, FAR = 0.01, 20.0  # [m] what is rendered lies between

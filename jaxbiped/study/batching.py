@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from jaxtyping import Int
 
-from jaxbiped.arenas.population import Population, PopulationConfig
+from jaxbiped.arenas.config import PopulationConfig
+from jaxbiped.arenas.population import Population
 from jaxbiped.arenas.source import OwnFamily, find_family, name_of
 from jaxbiped.core.component import kind_of, numbers_of, traced_component, with_numbers
 from jaxbiped.core.names import MOVING
@@ -23,7 +24,7 @@ from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.mission.terrain_check import program_for
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.arena_kinds import ANY, ArenaKind, kinds_of
 from jaxbiped.study.config import StudyConfig

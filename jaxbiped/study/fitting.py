@@ -14,8 +14,9 @@ from jaxbiped.config import field_docs
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.eyes import StereoEyes, where
 from jaxbiped.mission.settings import MissionConfig, MissionParams, program
-from jaxbiped.sensing.camera import CameraConfig, Mount
-from jaxbiped.sensing.landmarks import LandmarkConfig, sight
+from jaxbiped.sensing.camera import Mount
+from jaxbiped.sensing.config import CameraConfig, LandmarkConfig
+from jaxbiped.sensing.landmarks import sight
 from jaxbiped.sensing.presets import RayConfig, SensorConfig
 from jaxbiped.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
 from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks

@@ -20,7 +20,7 @@ from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.settings import MissionParams, MissionSpec
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 
 
 @with_own_settings

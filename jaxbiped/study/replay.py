@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import polars as pl
 
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.arenas.source import OwnFamily, find_family
 from jaxbiped.config import parse
 from jaxbiped.core.code_hash import component_hash

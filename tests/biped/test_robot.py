@@ -14,7 +14,7 @@ from jaxbiped.biped.model import PARTS, add_terrain, box_slots, home_qpos, part_
 from jaxbiped.biped.spread import MILD
 from jaxbiped.biped.trial import Disturbance, Tolerance, nominal_edge, play
 from jaxbiped.config import load
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 
 ROBOT = RobotModelConfig()
 PAPER = {  # Table 2's durations

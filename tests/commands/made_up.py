@@ -18,7 +18,7 @@ from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.reproduction import EXPERIMENTS
 from jaxbiped.reproduction.findings import Findings
 from jaxbiped.reproduction.mishaps import MISHAPS, Ending
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.study.fitting import Fit
 from jaxbiped.study.store import read_manifest
 from tests.commands.test_classify import ROOM

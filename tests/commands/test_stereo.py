@@ -20,7 +20,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.scan_map import ONE_LOOK, lay_out, make_chart
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 from jaxbiped.stereo import Disparity, to_points
 from jaxbiped.stereo.calibration_files import load_rig
 

@@ -19,7 +19,7 @@ from jaxbiped.mission.sampled_executor import DOWN, SIDE, STRAIGHT, TURN, UP, dr
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive
-from jaxbiped.sensing.odometry import OdometryConfig
+from jaxbiped.sensing.config import OdometryConfig
 from jaxbiped.study.queues import run_all
 from tests.mission.test_failures import scene
 

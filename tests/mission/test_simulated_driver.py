@@ -18,7 +18,7 @@ from jaxbiped.mission.simulated_driver import walk, walk_logged
 from jaxbiped.mission.simulated_step import carried_out
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 
 SIZE = (0.9, 0.6)
 CONFIG = MissionConfig(executor="native", camera=CameraConfig(columns=32, rows=24), walk={"threads": 1})

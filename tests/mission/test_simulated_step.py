@@ -6,7 +6,7 @@ import numpy as np
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation.kalman_filter import Belief
 from jaxbiped.mapping import Cell, GridSpec, classify, empty
-from jaxbiped.mapping.params import MapConfig
+from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mission.simulated_step import BACK, back_off, feel, hindered
 from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.primitives import Command

@@ -10,8 +10,8 @@ import pytest
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.motion import edge_approach as room
+from jaxbiped.motion.config import FootingConfig
 from jaxbiped.motion.primitives import Command, Primitive
-from jaxbiped.motion.robot import FootingConfig
 from jaxbiped.sensing import edges
 
 SPEC, CONFIG = GridSpec(), FootingConfig()

@@ -9,7 +9,7 @@ from jaxbiped.mapping import Cell
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import Mission, Played
-from jaxbiped.motion.primitives import DurationConfig
+from jaxbiped.motion.config import DurationConfig
 from jaxbiped.reproduction import EXPERIMENTS, PUBLISHED, SAVED, TABLE_1, expected, fit_measuring, typical
 from jaxbiped.reproduction.account import KINDS, Part, Record, other_reading, parts, record, walked
 from jaxbiped.reproduction.staging import load_scenes

@@ -10,7 +10,7 @@ from jaxbiped.mission.log import MissionLog, Outline, Walk
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 from jaxbiped.reproduction import EXPERIMENTS, TABLE_1, fit_measuring
 from jaxbiped.reproduction.account import KINDS, Part, Record
 from jaxbiped.reproduction.files import FIGURES, MISSIONS, write

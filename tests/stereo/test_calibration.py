@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.errors import InputError
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo import ideal
 from jaxbiped.stereo.calibration import PoseConfig
 from jaxbiped.stereo.calibration_files import load_rig

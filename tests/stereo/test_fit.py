@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE
-from jaxbiped.sensing.landmarks import RENDERED as LANDMARKS
-from jaxbiped.sensing.noise import RENDERED
+from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.stereo import fit
 from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
 
+RENDERED, LANDMARKS = PRESETS["rendered"].stereo, PRESETS["rendered"].landmarks
 HEIGHT, WIDTH, MOST = 384, 512, 159.0
 
 

@@ -11,8 +11,9 @@ from jaxbiped.arenas.arena import CIRCLE, SQUARE
 from jaxbiped.arenas.scene import BoxConfig, LandmarkConfig, SceneConfig, to_arena
 from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.localisation.kalman_filter import Belief, correct
-from jaxbiped.sensing.camera import CameraConfig, mount, placed
-from jaxbiped.sensing.landmarks import RENDERED
+from jaxbiped.sensing.camera import mount, placed
+from jaxbiped.sensing.config import CameraConfig
+from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.sensing.view import Sightings
 from jaxbiped.stereo import landmarks as marks
 from jaxbiped.stereo import scene
@@ -23,7 +24,7 @@ from jaxbiped.stereo.renderer import Renderer
 CAMERA = CameraConfig()
 RIG, AT = ideal(CAMERA), jax.device_get(mount(CAMERA.traced()))
 BELOW = float(AT.height)
-SPREAD = jax.device_get(RENDERED.traced())
+SPREAD = jax.device_get(PRESETS["rendered"].landmarks.traced())
 update = jax.jit(correct)
 
 

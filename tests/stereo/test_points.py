@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from jaxbiped.errors import InputError
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo import Disparity, StereoCamera, ideal, to_points
 
 CAMERA = StereoCamera(focal=994.978, centre=(311.193, 254.877), baseline=0.193001, size=(741, 500), doffs=31.086)

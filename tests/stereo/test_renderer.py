@@ -14,7 +14,8 @@ import pytest
 from jaxbiped.arenas import load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.sensing.camera import CameraConfig, mount, placed
+from jaxbiped.sensing.camera import mount, placed
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo import renderer as rendering
 from tests.reference import sensing as reference
 
@@ -134,7 +135,7 @@ DRAW = """
 import sys, numpy as np
 from jaxbiped.arenas import load_scene
 from jaxbiped.errors import InputError
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo.renderer import Renderer
 try:
     eye = Renderer(CameraConfig())

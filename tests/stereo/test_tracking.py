@@ -9,7 +9,8 @@ import pytest
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.sensing.camera import CameraConfig, mount, placed
+from jaxbiped.sensing.camera import mount, placed
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo import tracking
 from jaxbiped.stereo.calibration import ideal
 from jaxbiped.stereo.measure import StereoSensor

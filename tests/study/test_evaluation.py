@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.arenas.families import FAMILIES
-from jaxbiped.arenas.population import PopulationConfig
 from jaxbiped.mission import batched_driver
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.statistics.schema import validate

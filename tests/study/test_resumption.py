@@ -13,7 +13,7 @@ import polars as pl
 import pytest
 
 from jaxbiped import files
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.study import store

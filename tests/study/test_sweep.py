@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.config import parse
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
