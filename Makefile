@@ -7,17 +7,19 @@ BIN := $(VENV)/bin
 .PHONY: install compare quick test test-all lint bench docs clean
 
 # The quickest tests of every room: a minute on two cores.
-QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_imports.py core \
+QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_house.py test_imports.py core \
   $(addprefix arenas/, test_scene.py) \
-  $(addprefix mapping/, test_class_grid.py test_grid.py test_leveling.py test_moving_ai.py test_ros_map.py) \
+  $(addprefix mapping/, test_class_grid.py test_grid.py test_leveling.py) \
+  $(addprefix formats/, test_cloud.py test_moving_ai.py test_ros_map.py) \
   $(addprefix planning/, test_path.py) \
-  $(addprefix sensing/, test_cloud.py test_configs.py test_motion.py test_noise.py) \
-  $(addprefix sensing/stereo/, test_calibration.py test_images.py test_matching.py test_points.py test_rectify.py) \
-  $(addprefix motion/, test_edge.py test_gait.py test_primitives.py) \
+  $(addprefix sensing/, test_configs.py test_motion.py test_noise.py) \
+  $(addprefix stereo/, test_calibration.py test_images.py test_matching.py test_points.py test_rectify.py) \
+  $(addprefix motion/, test_edge.py test_primitives.py) $(addprefix biped/, test_gait.py) \
   $(addprefix physics/, test_inputs.py) \
-  $(addprefix mission/, test_footwork.py test_recording.py test_scenes.py) \
-  $(addprefix study/, test_clock.py test_pilot.py test_pointwise.py test_schema.py test_store.py test_sweep.py) \
-  $(addprefix report/, test_measured.py test_viewer_missions.py) \
+  $(addprefix mission/, test_primitive_schedule.py test_recording.py test_scenes.py) \
+  $(addprefix study/, test_clock.py test_store.py test_sweep.py) \
+  $(addprefix statistics/, test_sample_size_plan.py test_schema.py test_sweep_points.py) \
+  $(addprefix report/, test_measured.py) $(addprefix viewer/, test_mission_choice.py) \
   $(addprefix commands/, test_cache.py test_reproduce.py test_view.py))
 
 $(VENV)/installed: pyproject.toml

@@ -3,10 +3,11 @@
 Built in is the method of Yamashita, Kitaoka and Kaneko, "Motion Planning of Biped Robot Equipped with Stereo Camera
 Using Grid Map" (2011), called "the paper" in every docstring of this package. The names below are what sweep scripts
 need; each loads what it stands for when it is first used. The rooms follow the paper's Fig. 2: arenas, sensing,
-mapping, planning, motion, mission; then study and report. A room uses the rooms before it, never those after it.
+mapping, localisation, planning, motion, mission; then statistics, study and report. A room uses the rooms before it,
+never those after it.
 """
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 __version__ = "0.1.0"
 
@@ -14,12 +15,12 @@ lazy_package(
     __name__,
     {
         "api.study": "RandomArenas Scenes Study",
-        "api.register": "register",
-        "api.play": "PlayedMission play",
+        "api.registration": "register",
+        "api.single_mission": "PlayedMission play",
         "api.run": "evaluate load sweep",
         "api.results": "Results",
         "api.stored": "compare",
-        "api.plan": "plan",
+        "api.map_plan": "plan",
         "arenas.arena": "Arena",
         "arenas.config": "PopulationConfig",
         "arenas.make": "make_arena",

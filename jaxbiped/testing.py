@@ -6,7 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from jaxbiped.api.play import PlayedMission
+    from jaxbiped.api.single_mission import PlayedMission
 
 
 def tiny_mission(planner: Any = "full") -> PlayedMission:

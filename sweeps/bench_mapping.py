@@ -23,8 +23,8 @@ import numpy as np
 from jaxbiped.arenas import sample
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Body, GridSpec, MapConfig, classify, empty, update
-from jaxbiped.sensing import noise, raycast
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing import PRESETS, raycast
+from jaxbiped.sensing.config import CameraConfig
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.reference import mapping as reference
@@ -40,7 +40,9 @@ def inputs(views: int):
         arena = sample(jax.random.key(0), k)
         pose = Pose(arena.start_xyyaw[0], arena.start_xyyaw[1], jnp.float32(0), arena.start_xyyaw[2])
         seed = k.astype(jnp.uint32)
-        return raycast.measure(arena, pose, camera.traced(), noise.RENDERED.traced(), camera.image, seed), pose
+        return raycast.measure(
+            arena, pose, camera.traced(), PRESETS["rendered"].stereo.traced(), camera.image, seed
+        ), pose
 
     return jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(jnp.arange(views)))
 

@@ -22,14 +22,15 @@ from jaxbiped.arenas import sample
 from jaxbiped.commands.stereo import UNKNOWN_CONE, level_frame
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Cell, GridSpec, truth_grid
-from jaxbiped.mapping.chart import ONE_LOOK, make_chart
 from jaxbiped.mapping.floor import find_floor
-from jaxbiped.motion.robot import RobotConfig
-from jaxbiped.sensing.camera import CameraConfig, mount, placed
-from jaxbiped.sensing.stereo import MatchParams, ideal, match, to_points
-from jaxbiped.sensing.stereo.matching import grey, search
-from jaxbiped.sensing.stereo.points import useful_range
-from jaxbiped.sensing.stereo.renderer import Renderer
+from jaxbiped.mapping.scan_map import ONE_LOOK, make_chart
+from jaxbiped.motion.config import RobotConfig
+from jaxbiped.sensing.camera import mount, placed
+from jaxbiped.sensing.config import CameraConfig
+from jaxbiped.stereo import MatchParams, ideal, match, to_points
+from jaxbiped.stereo.matching import grey, search
+from jaxbiped.stereo.points import useful_range
+from jaxbiped.stereo.renderer import Renderer
 
 TILT = 0.6  # [deg] standard deviation of roll and pitch that nobody knows
 

@@ -34,18 +34,18 @@ import numpy as np
 
 from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.core.names import STRATEGIES
 from jaxbiped.devices import cores
 from jaxbiped.mission import decision
-from jaxbiped.mission.cycle import conclude, cycle, sense
+from jaxbiped.mission.batched_driver import SLOTS, stack
 from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.goal import goal_cell
-from jaxbiped.mission.queue import SLOTS, stack
+from jaxbiped.mission.mission_step import apply_outcome, sense, step
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import draw, evaluate
-from jaxbiped.study.names import STRATEGIES
+from jaxbiped.study.evaluation import draw, evaluate
 from jaxbiped.study.queues import run_all
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -106,7 +106,7 @@ def parts(repeats: int = 20):
     batch, seeds = draw(jax.random.key(0), jnp.arange(SLOTS), FAMILIES)
     setting = jax.tree.map(lambda leaf: jnp.asarray(leaf)[jnp.arange(SLOTS) % len(STRATEGIES)], points())
     world, mind = jax.vmap(partial(start, spec=PROGRAM.spec))(batch, setting, seeds)
-    turn = jax.jit(partial(cycle, program=PROGRAM))
+    turn = jax.jit(partial(step, program=PROGRAM))
     for _ in range(6):
         world, mind, *_ = turn(world, mind, batch, setting)
     spec, blind = PROGRAM.spec, setting.strategy.blind
@@ -121,7 +121,7 @@ def parts(repeats: int = 20):
 
     def execute(world, mind, command, verdict):
         done = jax.vmap(kinematic)(batch, world, command, setting)
-        ended = jax.vmap(partial(conclude, program=PROGRAM))(world, mind, command, verdict, done, batch, setting)
+        ended = jax.vmap(partial(apply_outcome, program=PROGRAM))(world, mind, command, verdict, done, batch, setting)
         return ended
 
     def part(name, function, *arguments):
@@ -143,7 +143,7 @@ def parts(repeats: int = 20):
     arguments = (mind, view, ij, goal_ij, moves, classes, levels, blind, setting)
     mind, command, verdict = part("select", choose, *arguments)
     part("execute", execute, world, mind, command, verdict)
-    part("all", partial(cycle, program=PROGRAM), world, mind, batch, setting)
+    part("all", partial(step, program=PROGRAM), world, mind, batch, setting)
 
 
 def reference_parts(arenas: int = 6) -> None:

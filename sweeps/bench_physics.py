@@ -34,9 +34,9 @@ import numpy as np
 from mujoco.batch import Batch
 
 from jaxbiped import physics
-from jaxbiped.motion.biped import RobotModelConfig
-from jaxbiped.motion.gait import home_table
-from jaxbiped.physics.robot import add_terrain, home_qpos, robot_spec
+from jaxbiped.biped.config import RobotModelConfig
+from jaxbiped.biped.gait import home_table
+from jaxbiped.biped.model import add_terrain, home_qpos, robot_spec
 
 RECORD = mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL
 TREMBLE = 0.02  # [rad] of every joint target, so that contacts come and go

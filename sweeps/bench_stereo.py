@@ -24,14 +24,14 @@ import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
 from jaxbiped.geometry.pose import wrap_angle
+from jaxbiped.localisation.kalman_filter import Belief, correct
 from jaxbiped.mapping import Cell
 from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.sensing.camera import CameraConfig
-from jaxbiped.sensing.localisation import Belief, correct
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import RayConfig
-from jaxbiped.sensing.stereo import landmarks, matching
-from jaxbiped.sensing.stereo.fit import quality, together
+from jaxbiped.stereo import landmarks, matching
+from jaxbiped.stereo.fit import quality, together
 from jaxbiped.study.fitting import choices, eye, least_contrast, unmarked, watch_from
 from jaxbiped.study.sensors import (
     AREA,

@@ -21,10 +21,10 @@ from pathlib import Path
 import jax
 
 from jaxbiped.devices import cores
-from jaxbiped.mission import queue
-from jaxbiped.study import evaluate, store
+from jaxbiped.mission import batched_driver
+from jaxbiped.study import evaluation, store
 from jaxbiped.study.clock import CompileClock
-from jaxbiped.study.conduct import table
+from jaxbiped.study.run_study import table
 from jaxbiped.study.sweep import SweepConfig
 
 
@@ -72,11 +72,11 @@ def main() -> None:
     options = parser.parse_args()
     config = costs(*((8, 64) if options.quick else (options.vectors, options.arenas)))
     clock, loops, others, writing = CompileClock(), Stopwatch(), Stopwatch(), Stopwatch()
-    queue.COMPILED = TimedPrograms(loops)
+    batched_driver.COMPILED = TimedPrograms(loops)
     compile_all(config)
-    compiling, programs = clock.seconds, len(queue.COMPILED)
+    compiling, programs = clock.seconds, len(batched_driver.COMPILED)
     print(f"{programs} program of the closed loop compiled, {compiling:.0f} s of compiling in all", flush=True)
-    evaluate.draw, evaluate.oracle_plan = others.timed(evaluate.draw), others.timed(evaluate.oracle_plan)
+    evaluation.draw, evaluation.oracle_plan = others.timed(evaluation.draw), others.timed(evaluation.oracle_plan)
     loops.seconds = 0.0
     points = tuple(config.points())
     with tempfile.TemporaryDirectory() as place:
@@ -84,13 +84,15 @@ def main() -> None:
         kind = {"seed": 0, "arenas": config.arenas, "points": table(points)}
         with store.create(Path(place) / "r", config, **kind) as results:
             append = writing.timed(results.append)
-            for shard, frame in evaluate.evaluate(config, points=points):
+            for shard, frame in evaluation.evaluate(config, points=points):
                 append(frame, shard.number, compile_time=0.0)
             rows = writing.timed(results.finish)(compile_time=0.0).rows
     wall, cpu = time.perf_counter() - begin, time.process_time() - begin_cpu
     inside = loops.seconds / cores() + others.seconds
     print(f"{len(points)} cost vectors x {config.arenas} arenas x 2 strategies: {rows} missions in {wall:.1f} s")
-    print(f"  compiled meanwhile: {len(queue.COMPILED) - programs} programs, {clock.seconds - compiling:.1f} s")
+    print(
+        f"  compiled meanwhile: {len(batched_driver.COMPILED) - programs} programs, {clock.seconds - compiling:.1f} s"
+    )
     print(f"  {rows / wall:.0f} missions/s; {cpu / wall:.2f} of {cores()} cores busy")
     print(f"  in compiled code: {100 * inside / wall:.1f} % of the time")
     print(f"    queues {loops.seconds / cores():.1f} s on each core, others {others.seconds:.1f} s")
@@ -103,7 +105,7 @@ def compile_all(config: SweepConfig) -> None:
     limits = config.mission.limits.model_copy(update={"max_decisions": 1})
     mission = config.mission.model_copy(update={"limits": limits})
     short = config.model_copy(update={"mission": mission})
-    for _ in evaluate.evaluate(short, points=tuple(short.points())):
+    for _ in evaluation.evaluate(short, points=tuple(short.points())):
         pass
 
 

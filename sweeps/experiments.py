@@ -21,14 +21,14 @@ from rich.console import Console
 from rich.table import Table
 
 from jaxbiped.arenas import load_scene
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
-from jaxbiped.sensing.hashing import from_key
+from jaxbiped.reproduction import EXPERIMENTS, Experiment
+from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.queues import run_all
-from jaxbiped.study.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.study.walks import walk_all
 
 SCENES = Path(__file__).parent.parent / "configs" / "scenes"

@@ -33,17 +33,17 @@ from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.mapping import truth_grid
 from jaxbiped.mission.decision import nearest_direction
-from jaxbiped.mission.following import follow
 from jaxbiped.mission.goal import goal_cell
+from jaxbiped.mission.plan_rollout import follow
 from jaxbiped.mission.route import pose_problem
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.motion.primitives import DurationConfig
+from jaxbiped.motion.config import DurationConfig
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
+from jaxbiped.statistics.intervals import mean_and_median, proportion
 from jaxbiped.study.config import StrategyName
 from jaxbiped.study.durations import fit
-from jaxbiped.study.evaluate import draw
-from jaxbiped.study.intervals import mean_and_median, proportion
+from jaxbiped.study.evaluation import draw
 
 TOGETHER = 128  # arenas
 SAME, WORTH = 0.01, 0.5  # [s]

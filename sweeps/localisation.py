@@ -26,15 +26,15 @@ from rich.table import Table
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.mission.batched_driver import Result, stack
 from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Result, stack
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing import VisualConfig
-from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.evaluate import draw
+from jaxbiped.sensing.counter_rng import from_key
+from jaxbiped.statistics.paired import success_difference
+from jaxbiped.study.evaluation import draw
 from jaxbiped.study.hosted import open_eyes, run_on_host
-from jaxbiped.study.paired import success_difference
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
 

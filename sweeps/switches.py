@@ -4,7 +4,7 @@
     python sweeps/switches.py foot-placement [--arenas N] [--executor native]     (feet placed by measured edges)
 
 Off foot placement, ask `native`: what `sampled` draws from was measured of steps that are placed about right, and it
-makes robots fall that simulated ones save by stopping at an edge and stepping back (`mission.judging`).
+makes robots fall that simulated ones save by stopping at an edge and stepping back (`mission.simulated_step`).
 
 Prints how the missions ended, and the paired differences with their intervals, over all arenas and by family: the
 switch on, less off. `jaxbiped compare --planner heading`, or `--foot-placement False`, keeps such missions in a folder,
@@ -22,10 +22,10 @@ from rich.console import Console
 
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.report.tables import terminal
-from jaxbiped.study.comparison import compare_named
+from jaxbiped.statistics.comparison import compare_named
+from jaxbiped.statistics.schema import FAMILIES
 from jaxbiped.study.config import Family, StrategyName, StudyConfig
-from jaxbiped.study.evaluate import evaluate
-from jaxbiped.study.schema import FAMILIES
+from jaxbiped.study.evaluation import evaluate
 
 Executor = Literal["kinematic", "sampled", "native", "mjx"]
 

@@ -2,7 +2,7 @@
 
     python sweeps/visual_odometry.py [--arenas N] [--views N] [--seed N]
 
-Printed are the errors of the motion that `sensing.stereo.tracking` finds, for each kind of command, how often it finds
+Printed are the errors of the motion that `stereo.tracking` finds, for each kind of command, how often it finds
 one, and the errors as multiples of what it claims; then the figures of `sensing.motion.VisualConfig` that fit them:
 errors times the square root of the share of the image that both views measure.
 """
@@ -23,13 +23,14 @@ from rich.table import Table
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.camera import mount, placed
-from jaxbiped.sensing.hashing import fold
-from jaxbiped.sensing.motion import SHARE, VisualConfig, overlap
+from jaxbiped.sensing.config import VisualConfig
+from jaxbiped.sensing.counter_rng import fold
+from jaxbiped.sensing.motion import SHARE, overlap
 from jaxbiped.sensing.noise import attitude_error
-from jaxbiped.sensing.stereo.matching import grey
-from jaxbiped.sensing.stereo.measure import StereoSensor
-from jaxbiped.sensing.stereo.tracking import find_features, find_motion
 from jaxbiped.sensing.view import View
+from jaxbiped.stereo.matching import grey
+from jaxbiped.stereo.measure import StereoSensor
+from jaxbiped.stereo.tracking import find_features, find_motion
 from jaxbiped.study.sensors import Place, worlds
 
 

@@ -10,12 +10,12 @@ from PIL import Image
 from pypcd4 import Encoding, PointCloud
 
 from jaxbiped.arenas.scene import load_scene
-from jaxbiped.mapping import class_grid, moving_ai, ros_map
+from jaxbiped.formats import cloud, moving_ai, ros_map
+from jaxbiped.formats.cloud import save_ply
+from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.class_grid import ClassGrid
-from jaxbiped.sensing import cloud
-from jaxbiped.sensing.cloud import save_ply
-from jaxbiped.sensing.stereo import images
-from jaxbiped.sensing.stereo.calibration_files import load_rig
+from jaxbiped.stereo import images
+from jaxbiped.stereo.calibration_files import load_rig
 from tests.nasty_files import read_or_refuse, same, spoilt
 
 POINTS = np.random.default_rng(0).integers(-400, 400, (40, 3)).astype(np.float32) / 128

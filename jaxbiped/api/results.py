@@ -13,15 +13,15 @@ import polars as pl
 import pydantic
 
 from jaxbiped.config import Model
+from jaxbiped.core.names import MEASURES
 from jaxbiped.errors import InputError
 from jaxbiped.mission.metric import MetricFormat, format_of
 from jaxbiped.mission.strategies import Strategy
+from jaxbiped.statistics.comparison import Comparison, compare, default_pairs
+from jaxbiped.statistics.schema import metric_columns, ordered, validate
 from jaxbiped.study import store
-from jaxbiped.study.comparison import Comparison, compare, default_pairs
+from jaxbiped.study.batching import metrics_of
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import metrics_of
-from jaxbiped.study.names import MEASURES
-from jaxbiped.study.schema import metric_columns, ordered, validate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -73,7 +73,7 @@ class Compared(Table):
 class Results:
     """The rows of a study or a sweep."""
 
-    rows: pl.DataFrame  # of `study.schema.SCHEMA`: one for each sweep point, arena and strategy
+    rows: pl.DataFrame  # of `statistics.schema.SCHEMA`: one for each sweep point, arena and strategy
     points: pl.DataFrame  # `point`, and a column for each field that is swept
     config: dict[str, Any]  # of the study, as it is stored
     folder: Path | None = None  # where it is stored
@@ -148,8 +148,8 @@ class Results:
 
     @cached_property
     def pointwise(self):
-        """The statistics of every sweep point (`study.pointwise.SweepResult`)."""
-        from jaxbiped.study.pointwise import pointwise
+        """The statistics of every sweep point (`statistics.sweep_points.SweepResult`)."""
+        from jaxbiped.statistics.sweep_points import pointwise
 
         return pointwise(self.rows, self.points, self.config, seed=self.config["seed"])
 
@@ -170,7 +170,7 @@ class Results:
             raise InputError(
                 "draws one field; filter `rows` and `points` for the others", field="plot", value=self.axes
             )
-        from jaxbiped.report.own_metric import own_metric
+        from jaxbiped.report.metric_figure import own_metric
 
         return own_metric(self.rows, self.points, metric, shown=self.shown)
 
@@ -198,9 +198,9 @@ class Results:
         Raises:
           InputError: a strategy, arena or point that is not there; a strategy whose code is not what it was.
         """
-        from jaxbiped.api.play import PlayedMission
-        from jaxbiped.study.again import play_again
+        from jaxbiped.api.single_mission import PlayedMission
         from jaxbiped.study.manifest import Manifest
+        from jaxbiped.study.replay import play_again
 
         where = (pl.col("strategy") == strategy) & (pl.col("arena") == arena) & (pl.col("point") == point)
         if self.rows.filter(where).is_empty():

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import polars as pl
 
-from jaxbiped.api.register import named
+from jaxbiped.api.registration import named
 from jaxbiped.api.results import Results
 from jaxbiped.api.study import Study
 from jaxbiped.errors import InputError
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.study import store
-from jaxbiped.study.conduct import conduct, table
-from jaxbiped.study.evaluate import Progress
-from jaxbiped.study.evaluate import evaluate as evaluate_shards
+from jaxbiped.study.evaluation import Progress
+from jaxbiped.study.evaluation import evaluate as evaluate_shards
+from jaxbiped.study.run_study import conduct, table
 from jaxbiped.study.runner import check_mission
 
 

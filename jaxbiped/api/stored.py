@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from jaxbiped.api.results import Compared, Results
-from jaxbiped.study.sides import Stored, choose, compare_sides, open_stored
+from jaxbiped.study.stored_series import Stored, choose, compare_sides, open_stored
 
 
 def compare(

@@ -9,10 +9,11 @@ from typing import Any
 
 import pydantic
 
-from jaxbiped.api.register import family_name, named, register
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.api.registration import family_name, named, register
+from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.arenas.source import Family
 from jaxbiped.config import input_error
+from jaxbiped.core.names import METRICS
 from jaxbiped.errors import InputError
 from jaxbiped.mission.execution import Executor
 from jaxbiped.mission.metric import Metric
@@ -20,12 +21,11 @@ from jaxbiped.mission.sensors import Sensor
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import STRATEGIES, Strategy
 from jaxbiped.planning.planners import Planner
+from jaxbiped.statistics.schema import FAMILIES
+from jaxbiped.statistics.schema import STRATEGIES as BUILT_IN
+from jaxbiped.study.batching import check_numbers, strategies_of
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import check_numbers, strategies_of
-from jaxbiped.study.names import METRICS
-from jaxbiped.study.schema import FAMILIES
-from jaxbiped.study.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.sweep import SweepConfig
 
 

@@ -1,6 +1,6 @@
 """The world: arenas, random families, and scenes written by hand."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,
@@ -8,7 +8,7 @@ lazy_package(
         "arena": "CIRCLE SQUARE Arena Landmarks",
         "config": "PopulationConfig",
         "families": "FAMILIES KNOWN MOVING sample",
-        "movers": "Movers at_time only",
+        "moving_boxes": "Movers at_time only",
         "population": "Population",
         "scene": "SceneConfig load_scene scene_warnings to_arena",
     },

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import jax
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxbiped.arenas.movers import Movers
+from jaxbiped.arenas.moving_boxes import Movers
 from jaxbiped.geometry.boxes import Boxes
 from jaxbiped.geometry.height_field import HeightField
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from jaxbiped.arenas.arena import CIRCLE, SQUARE, Arena, Landmarks
-from jaxbiped.arenas.movers import Movers
+from jaxbiped.arenas.moving_boxes import Movers
 from jaxbiped.arenas.population import Population, given_or
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked

@@ -8,9 +8,6 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from jaxbiped.arenas.config import FAMILY_OF as FAMILY_OF
-from jaxbiped.arenas.config import PopulationConfig as PopulationConfig
-
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from jaxbiped.commands.options.cache import CacheArgs
 from jaxbiped.core import kept_files
-from jaxbiped.core.cache_folder import KERNELS, MOST_PROGRAMS, OFF, PROGRAMS, VARIABLE, cache_folder
+from jaxbiped.core.cache_location import KERNELS, MOST_PROGRAMS, OFF, PROGRAMS, VARIABLE, cache_folder
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
 

@@ -11,8 +11,8 @@ from jaxtyping import Float
 from jaxbiped.commands.options.charting import ChartArgs
 from jaxbiped.files import write_whole
 from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.chart import Chart, lay_out, make_chart
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.mapping.scan_map import Chart, lay_out, make_chart
 
 
 def chart(

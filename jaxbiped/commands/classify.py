@@ -13,9 +13,9 @@ from jaxbiped.commands.options.classify import ClassifyArgs
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
-from jaxbiped.mapping.upright import FRAMES, Upright, find_upright, set_upright
-from jaxbiped.sensing import cloud as clouds
-from jaxbiped.sensing.cloud import Cloud
+from jaxbiped.formats import cloud as clouds
+from jaxbiped.formats.cloud import Cloud
+from jaxbiped.mapping.gravity import FRAMES, Upright, find_upright, set_upright
 from jaxbiped.terminal import legible
 
 

@@ -6,21 +6,21 @@ from pathlib import Path
 
 from rich.console import Console
 
-from jaxbiped.commands.engine import engine
+from jaxbiped.commands.engine_choice import engine
 from jaxbiped.commands.options.compare import CompareArgs
-from jaxbiped.commands.progress import progress
+from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.report.folder_report import terminal_report, write_report
-from jaxbiped.study.comparison import default_pairs
+from jaxbiped.statistics.comparison import default_pairs
+from jaxbiped.statistics.sequential import Goal
+from jaxbiped.study.batching import groups_of, shards, strategies_of
 from jaxbiped.study.components import fingerprinted
-from jaxbiped.study.conduct import conduct, never
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import groups_of, shards, strategies_of
-from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.resumption import refuse_taken
+from jaxbiped.study.run_study import conduct, never
 from jaxbiped.study.runner import check_mission
-from jaxbiped.study.sequential import Goal
 from jaxbiped.study.stopping import Rule
 
 

@@ -16,8 +16,7 @@ from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing, write_whole
 from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.sensing.camera import CameraConfig
-from jaxbiped.sensing.noise import NoiseConfig
+from jaxbiped.sensing.config import CameraConfig, NoiseConfig
 from jaxbiped.study.fitting import ALIKE, Fit, choices, fit, sensor_toml
 from jaxbiped.study.sensors import Place, agreement, fused, looking, mission, same, score, with_rays, worlds
 

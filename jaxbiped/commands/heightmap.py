@@ -20,7 +20,7 @@ from jaxbiped.formats.elevation import Elevation, load_elevation, save_elevation
 from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.grid import MOST_CELLS, MOST_GROUNDS, GridSpec
 from jaxbiped.mapping.truth import terrain_grid
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 from jaxbiped.terminal import legible
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ import numpy as np
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
-from jaxbiped.mapping import class_grid, moving_ai, ros_map
+from jaxbiped.formats import moving_ai, ros_map
+from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mapping.inflate import inflate
+from jaxbiped.mapping.inflation import inflate
 from jaxbiped.report.axis import CENTIMETRES, METRES, Axis
 
 SUFFIXES = {

@@ -15,21 +15,21 @@ import numpy as np
 import polars as pl
 from rich.console import Console
 
+from jaxbiped.biped.agreement import CROSSING, outcomes, paths
+from jaxbiped.biped.config import RobotModelConfig
+from jaxbiped.biped.gait import PrimitiveTable, generate
+from jaxbiped.biped.optimiser import optimise
+from jaxbiped.biped.primitive_catalogue import catalogue
+from jaxbiped.biped.request import Request
+from jaxbiped.biped.spread import SETS
+from jaxbiped.biped.trial import RIMS, Disturbance, Tolerance, passes_gate
+from jaxbiped.biped.verify import trials
 from jaxbiped.commands.options.primitives import PrimitivesArgs
 from jaxbiped.config import config_hash, load
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.motion.biped import RobotModelConfig
-from jaxbiped.motion.catalogue import catalogue
-from jaxbiped.motion.gait import PrimitiveTable, generate
-from jaxbiped.motion.optimise import optimise
-from jaxbiped.motion.request import Request
-from jaxbiped.motion.robot import RobotConfig
-from jaxbiped.physics.agreement import CROSSING, outcomes, paths
-from jaxbiped.physics.spread import SETS
-from jaxbiped.physics.trial import RIMS, Disturbance, Tolerance, passes_gate
-from jaxbiped.physics.verify import trials
-from jaxbiped.report.library import library, library_text
+from jaxbiped.motion.config import RobotConfig
+from jaxbiped.report.library_file import library, library_text
 from jaxbiped.report.primitives import markdown, save_windows, terminal
 from jaxbiped.report.video import save_primitive
 from jaxbiped.study import store

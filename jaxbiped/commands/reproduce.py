@@ -17,18 +17,18 @@ from jaxbiped.commands.options.reproduce import ReproduceArgs
 from jaxbiped.config import config_hash, parse
 from jaxbiped.files import refuse_existing
 from jaxbiped.mission.settings import SIMULATED, MissionConfig
-from jaxbiped.report.reproduction.files import write
-from jaxbiped.report.reproduction.page import answer
+from jaxbiped.reproduction import EXPERIMENTS, PUBLISHED, fit_measuring
+from jaxbiped.reproduction.files import write
+from jaxbiped.reproduction.findings import Findings
+from jaxbiped.reproduction.gather import MISSIONS, experiment, lintel, mishaps, shortest, strategies
+from jaxbiped.reproduction.page import answer
+from jaxbiped.reproduction.savings import always, population, study
+from jaxbiped.reproduction.staging import load_scenes
+from jaxbiped.reproduction.table_1 import SCENES
+from jaxbiped.reproduction.table_2 import NAMES, verify_all
 from jaxbiped.study import store
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import evaluate
-from jaxbiped.study.reproduction import EXPERIMENTS, PUBLISHED, fit_measuring
-from jaxbiped.study.reproduction.findings import Findings
-from jaxbiped.study.reproduction.gather import MISSIONS, experiment, lintel, mishaps, shortest, strategies
-from jaxbiped.study.reproduction.saved import always, population, study
-from jaxbiped.study.reproduction.staging import load_scenes
-from jaxbiped.study.reproduction.table_1 import SCENES
-from jaxbiped.study.reproduction.table_2 import NAMES, verify_all
+from jaxbiped.study.evaluation import evaluate
 from jaxbiped.study.runner import seeing
 from jaxbiped.terminal import command_line
 
@@ -50,7 +50,7 @@ def main(args: ReproduceArgs) -> int:
     refuse_existing(out)
     arenas = load_scenes(args.scenes, (*(item.scene for item in EXPERIMENTS), *SCENES))
     if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+        from jaxbiped.mission.simulated_driver import rehearse  # loads MuJoCo
 
         rehearse(config)
     console, began = Console(), time.perf_counter()

@@ -13,8 +13,8 @@ from jaxbiped.config import config_hash
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.pose_error import pose_facts, pose_sentence
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.recording import FILE, save_log
-from jaxbiped.mission.stepped import Mission
 from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.report.animation import save_gif
 from jaxbiped.report.pictures import save_mission

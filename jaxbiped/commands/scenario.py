@@ -17,9 +17,9 @@ from rich.progress import track
 from jaxbiped.commands.map_source import MapSource
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, write_whole
+from jaxbiped.formats.moving_ai import load_scenario
 from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mapping.moving_ai import load_scenario
 from jaxbiped.planning import Costs, Rules, field
 
 OCTILE = Costs(1.0, 0.0, 0.0, 0.0, 0.0)  # a straight move 1, an oblique one sqrt(2), and nothing else

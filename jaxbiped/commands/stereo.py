@@ -14,14 +14,14 @@ from jaxbiped.commands.options.stereo import StereoArgs
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing
+from jaxbiped.formats.cloud import save_ply
 from jaxbiped.mapping.floor import Floor, find_floor
-from jaxbiped.sensing.cloud import save_ply
-from jaxbiped.sensing.stereo.calibration_files import load_rig
-from jaxbiped.sensing.stereo.images import as_rgb, load_pair
-from jaxbiped.sensing.stereo.matching import match
-from jaxbiped.sensing.stereo.order import check_order
-from jaxbiped.sensing.stereo.points import to_points, useful_range
-from jaxbiped.sensing.stereo.rectify import Rig
+from jaxbiped.stereo.calibration_files import load_rig
+from jaxbiped.stereo.images import as_rgb, load_pair
+from jaxbiped.stereo.matching import match
+from jaxbiped.stereo.order import check_order
+from jaxbiped.stereo.points import to_points, useful_range
+from jaxbiped.stereo.rectify import Rig
 from jaxbiped.terminal import legible
 
 UNKNOWN_CONE = math.radians(65.0)  # of a camera that is held upright, pitched by any angle

@@ -10,16 +10,16 @@ from rich.console import Console
 from jaxbiped.commands.options.stored import StoredArgs
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.report.answer import answer
+from jaxbiped.report.answer_text import answer
+from jaxbiped.report.comparison_report import LIMITATIONS, question
 from jaxbiped.report.grid import to_grid
 from jaxbiped.report.page import PAGE, Section, page_of, render
 from jaxbiped.report.stored import equivalence_sheets, plan_sentences, terminal_sheets, written_sheets
-from jaxbiped.report.summary import LIMITATIONS, question
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
-from jaxbiped.study import Comparison
-from jaxbiped.study.equivalence import equivalences
-from jaxbiped.study.pilot import plan
-from jaxbiped.study.sides import Side, choose, compare_sides, open_stored
+from jaxbiped.statistics import Comparison
+from jaxbiped.statistics.equivalence import equivalences
+from jaxbiped.statistics.sample_size_plan import plan
+from jaxbiped.study.stored_series import Side, choose, compare_sides, open_stored
 from jaxbiped.terminal import command_line
 
 

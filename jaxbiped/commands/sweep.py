@@ -7,19 +7,19 @@ from pathlib import Path
 import jax
 from rich.console import Console
 
-from jaxbiped.commands.engine import engine
+from jaxbiped.commands.engine_choice import engine
 from jaxbiped.commands.options.sweep import SweepArgs
-from jaxbiped.commands.progress import progress
+from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.mission.eyes import try_eyes
 from jaxbiped.report.folder_report import terminal_report, write_report
+from jaxbiped.study.batching import groups_of, shards, strategies_of
 from jaxbiped.study.components import fingerprinted
-from jaxbiped.study.conduct import conduct
-from jaxbiped.study.groups import groups_of, shards, strategies_of
-from jaxbiped.study.memory import check_memory
-from jaxbiped.study.resume import refuse_taken
+from jaxbiped.study.memory_limit import check_memory
+from jaxbiped.study.resumption import refuse_taken
+from jaxbiped.study.run_study import conduct
 from jaxbiped.study.runner import check_mission
 from jaxbiped.study.sweep import SweepConfig
 

@@ -14,18 +14,18 @@ from rich.console import Console
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.commands.options.tune import TuneArgs
-from jaxbiped.commands.progress import progress
+from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mission.library import load_library
 from jaxbiped.mission.settings import program
-from jaxbiped.motion.primitives import DurationConfig
+from jaxbiped.motion.config import DurationConfig
 from jaxbiped.report.tables import to_markdown, to_rich
 from jaxbiped.report.tuning import costs_sheet, costs_toml, fits_sheet, gaps_sheet, missions, sentence, write_tuning
 from jaxbiped.study import store
 from jaxbiped.study.durations import Fit, fit, table_2
-from jaxbiped.study.tune import TuneConfig, Tuning, tune
+from jaxbiped.study.tuning import TuneConfig, Tuning, tune
 from jaxbiped.terminal import command_line
 
 

@@ -7,8 +7,8 @@ import webbrowser
 
 from jaxbiped.commands.options.view import ViewArgs
 from jaxbiped.errors import InputError
-from jaxbiped.report.viewer.missions import Missions, Place, Study, missions
-from jaxbiped.report.viewer.server import refuse_taken, require, serving
+from jaxbiped.viewer.mission_choice import Missions, Place, Study, missions
+from jaxbiped.viewer.server import refuse_taken, require, serving
 
 
 def main(args: ViewArgs) -> int:

@@ -1,5 +1,5 @@
 """What all rooms share."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(__name__, {})

@@ -3,7 +3,7 @@
 JAX has a cache of its own, of which this is the part that reads and writes files: bounded in size without another
 library, silent where the disk is full, read-only or damaged, and healed by the next writer. JAX's key is a hash of the
 lowered program, of the versions of JAX and XLA and of their options; the folder's name is one of the processor, whose
-instructions an executable may use. An executable calls kernels (`planning.compiled`) by name, and finds those of its
+instructions an executable may use. An executable calls kernels (`planning.kernels`) by name, and finds those of its
 own process: it holds none of their code.
 
 A cache that the user has chosen (`JAX_COMPILATION_CACHE_DIR`) is left to JAX.
@@ -20,7 +20,7 @@ from pathlib import Path
 import jax
 
 from jaxbiped.core import kept_files
-from jaxbiped.core.cache_folder import MOST_PROGRAMS, PROGRAMS, cache_folder
+from jaxbiped.core.cache_location import MOST_PROGRAMS, PROGRAMS, cache_folder
 
 KIND = b"jaxbiped program 1\n"
 QUICK = 0.05  # [s] of compiling: what takes less is compiled again

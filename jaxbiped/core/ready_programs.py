@@ -28,10 +28,10 @@ from jax._src.lib import xla_client
 from jax.experimental import serialize_executable
 
 from jaxbiped.core import kept_files
-from jaxbiped.core.cache_folder import MOST_PROGRAMS
-from jaxbiped.core.lazy_package import REPLACED
+from jaxbiped.core.cache_location import MOST_PROGRAMS
+from jaxbiped.core.lazy_loading import REPLACED
 from jaxbiped.core.program_cache import LAST, program_folder
-from jaxbiped.core.program_key import compile_settings, has_one_device, program_key, trace_settings
+from jaxbiped.core.program_identity import compile_settings, has_one_device, program_key, trace_settings
 
 KIND = b"jaxbiped ready program 1\n"
 

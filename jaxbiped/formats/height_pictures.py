@@ -10,10 +10,7 @@ import numpy as np
 from jaxtyping import Float, Float64, Shaped
 from PIL import Image, UnidentifiedImageError
 
-from jaxbiped.errors import InputError
-from jaxbiped.files import reason
-from jaxbiped.formats.heights import check_shape
-from jaxbiped.sensing.image_depth import (
+from jaxbiped.core.image_depth import (
     COLOURS,
     HEIGHT,
     PNG,
@@ -25,6 +22,9 @@ from jaxbiped.sensing.image_depth import (
     sample_bits,
     tiff_tags,
 )
+from jaxbiped.errors import InputError
+from jaxbiped.files import reason
+from jaxbiped.formats.heights import check_shape
 
 ORIENTATION = 0x0112  # the EXIF tag
 

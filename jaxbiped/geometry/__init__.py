@@ -1,6 +1,6 @@
 """Poses in the plane, upright boxes and height fields, and rays that meet them."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

@@ -1,6 +1,6 @@
 """Points to a classed 2D grid map."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import jax
 from jaxtyping import Array, Float
 
-from jaxbiped.mapping.config import MapConfig as MapConfig
-
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)

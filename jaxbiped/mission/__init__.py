@@ -1,6 +1,6 @@
 """The closed loop: sense, localise, map, plan, select, execute, until each mission has ended."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,
@@ -12,10 +12,10 @@ lazy_package(
         "log": "MissionLog",
         "oracle": "OraclePlan oracle_plan",
         "outcome": "Code",
-        "queue": "Jobs Result Tally compile_queue stack",
-        "settings": "Program Settings program",
-        "state": "Mind World start",
-        "stepped": "Mission run_logged",
+        "batched_driver": "Jobs Result Tally compile_queue stack",
+        "settings": "MissionSpec MissionParams program",
+        "state": "AgentState WorldState start",
+        "recorded_driver": "Mission run_logged",
         "strategies": "STRATEGIES Strategy find_strategy",
     },
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import pydantic
 
+from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.config import Model
 from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
 from jaxbiped.core.registry import SENSORS as SENSORS_OWN
@@ -17,14 +18,14 @@ from jaxbiped.mission.defaults import BELOW_POINTS as BELOW_POINTS
 from jaxbiped.mission.defaults import SIMULATED as SIMULATED
 from jaxbiped.mission.defaults import SWAYING as SWAYING
 from jaxbiped.mission.defaults import with_defaults
-from jaxbiped.motion.biped import RobotModelConfig
 from jaxbiped.motion.config import HEIGHT_TOLERANCE, DurationConfig, RobotConfig
 from jaxbiped.sensing.config import CameraConfig, LandmarkConfig, NoiseConfig, OdometryConfig, VisualConfig
 from jaxbiped.sensing.presets import PRESETS, sensor_preset
 
 if TYPE_CHECKING:
     from jaxbiped.mapping.grid import GridSpec
-    from jaxbiped.mission.settings import Settings
+    from jaxbiped.mission.settings import MissionParams
+    from jaxbiped.mission.strategies import Strategy
     from jaxbiped.planning.costs import Costs
 
 # [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
@@ -185,7 +186,7 @@ class MissionConfig(Model):
         above = max(spec.levels + spec.lowest, min(grounds + HEADROOM, 32))
         return replace(spec, lowest=lowest, levels=above - lowest, ground_levels=grounds)
 
-    def settings(self, strategy: str | Strategy) -> Settings:
+    def settings(self, strategy: str | Strategy) -> MissionParams:
         """The traced part, for one strategy or the one of a name."""
         from jaxbiped.mission.settings import settings_of
 

@@ -17,13 +17,13 @@ from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.fading import Eye
-from jaxbiped.mission.footing import place_feet
+from jaxbiped.mission.foot_placement import place_feet
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.localising import localise
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.route import pose_problem
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.state import Mind, Planned
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState, Planned
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
 from jaxbiped.planning.planners import FINE, TOO_SLOW, Problem, Route
@@ -35,7 +35,7 @@ LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is know
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Thought:
+class DecisionTrace:
     """What led to a command; for logs and pictures."""
 
     classes: Int[Array, "B H W"]
@@ -50,14 +50,14 @@ class Thought:
 
 @with_own_settings
 def decide(
-    mind: Mind,
+    mind: AgentState,
     view: View,
     sightings: Sightings,
     arena: Arena,
-    settings: Settings,
-    program: Program,
+    settings: MissionParams,
+    program: MissionSpec,
     active: Bool[Array, "B"] | None = None,
-) -> tuple[Mind, Command, Int[Array, "B"], Thought]:
+) -> tuple[AgentState, Command, Int[Array, "B"], DecisionTrace]:
     """What each robot does next. All arguments have a leading batch axis.
 
     Of the arena only what the robot was told is read: landmarks and goal (paper, 2, conditions 2 and 3).
@@ -92,7 +92,7 @@ def decide(
         code = jnp.where(route.fault == TOO_SLOW, Code.PLANNER_TIMEOUT, Code.PLANNER_FAILED)
         verdict = jnp.where(route.fault == FINE, verdict, code).astype(jnp.int32)
     evidence = mind.grid_map.evidence
-    thought = Thought(classes, levels, problem, route, mind.belief.pose, view, evidence, sightings.seen)
+    thought = DecisionTrace(classes, levels, problem, route, mind.belief.pose, view, evidence, sightings.seen)
     return mind, command, verdict, thought
 
 
@@ -106,15 +106,15 @@ def counted(planned: Planned, route: Route) -> Planned:
 
 
 def perceive(
-    mind: Mind, view: View, sightings: Sightings, arena: Arena, settings: Settings, program: Program
-) -> tuple[Mind, Int[Array, "B H W"], Int[Array, "B H W"], Int[Array, "B 2"]]:
+    mind: AgentState, view: View, sightings: Sightings, arena: Arena, settings: MissionParams, program: MissionSpec
+) -> tuple[AgentState, Int[Array, "B H W"], Int[Array, "B H W"], Int[Array, "B 2"]]:
     """Each robot after a measurement: its mind, the classed map, and its cell."""
     mind = jax.vmap(localise, in_axes=(0, 0, 0, 0, 0, None))(mind, view, sightings, arena.landmarks, settings, program)
     mind = begin_maps(mind, settings, program.spec)
     return jax.vmap(read_map, in_axes=(0, 0, 0, None))(mind, view, settings, program)
 
 
-def begin_maps(mind: Mind, settings: Settings, spec: GridSpec) -> Mind:
+def begin_maps(mind: AgentState, settings: MissionParams, spec: GridSpec) -> AgentState:
     """Fresh minds with a map of nothing but what their robot stands on.
 
     Few of a batch are fresh at once, and maps are large: only theirs are written.
@@ -139,8 +139,8 @@ def level_of(z: Float[Array, ""], spec: GridSpec) -> Int[Array, ""]:
 
 
 def read_map(
-    mind: Mind, view: View, settings: Settings, program: Program
-) -> tuple[Mind, Int[Array, "H W"], Int[Array, "H W"], Int[Array, "2"]]:
+    mind: AgentState, view: View, settings: MissionParams, program: MissionSpec
+) -> tuple[AgentState, Int[Array, "H W"], Int[Array, "H W"], Int[Array, "2"]]:
     """One robot with one more view: its mind, the classed map, and its cell.
 
     Heights are counted, level by level; what its ground is off a level was measured before it stepped there.
@@ -163,14 +163,14 @@ def read_map(
     return replace(mind, grid_map=grid_map), classes, levels, ij
 
 
-def eye_of(mind: Mind, settings: Settings, program: Program) -> Eye:
+def eye_of(mind: AgentState, settings: MissionParams, program: MissionSpec) -> Eye:
     """What a robot measures by, and how much it keeps of what its new view tells otherwise."""
     at = mount(settings.camera, mind.look, mind.squat)
     return Eye(settings.camera, at, program.image, keep=jnp.exp(-mind.since / settings.mapping.fade))
 
 
 def choose(
-    mind: Mind,
+    mind: AgentState,
     view: View,
     ij: Int[Array, "2"],
     goal_ij: Int[Array, "2"],
@@ -178,9 +178,9 @@ def choose(
     classes: Int[Array, "H W"],
     levels: Int[Array, "H W"],
     blind: Bool[Array, ""],
-    settings: Settings,
-    program: Program,
-) -> tuple[Mind, Command, Int[Array, ""]]:
+    settings: MissionParams,
+    program: MissionSpec,
+) -> tuple[AgentState, Command, Int[Array, ""]]:
     """The command of one robot, and whether it gives up.
 
     In the goal's cell there is nowhere to go: if the referee has not ended the mission by then, the robot is stuck.

@@ -15,7 +15,7 @@ from jaxbiped.core.registry import EXECUTORS
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.config import SIMULATED
-from jaxbiped.motion.robot import STEP_TOLERANCE
+from jaxbiped.motion.config import STEP_TOLERANCE
 
 CHECKS = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
 TOUCH = STEP_TOLERANCE  # [m] contact that counts as none: rounding, and boxes that just end at a height
@@ -45,7 +45,7 @@ class Executor:
     on_terrain: ClassVar[bool] = False  # it knows arenas with terrain
 
     def execute(self, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
-        """What comes of one `Command` in an `Arena`, from the `World` before it.
+        """What comes of one `Command` in an `Arena`, from the `WorldState` before it.
 
         Noise is a function of `world.seed` and `world.decisions` alone (`core` `fold`): the same for every batch.
         """

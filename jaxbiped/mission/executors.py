@@ -18,16 +18,16 @@ from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.execution import CHECKS, ODOMETRY, TOUCH, Execution, Executor
-from jaxbiped.mission.sampled import sampled
-from jaxbiped.mission.settings import Settings
-from jaxbiped.mission.state import World
+from jaxbiped.mission.sampled_executor import sampled
+from jaxbiped.mission.settings import MissionParams
+from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command, duration
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 
 
 @with_own_settings
-def kinematic(arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+def kinematic(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
     """Nominal displacement and time (Table 2); odometry drifts from what was walked.
 
     Referee, from the true arena: the robot collides when a box between its foot, raised by a step, and its head, or
@@ -80,7 +80,7 @@ class Kinematic(Executor):
 
     on_terrain = True
 
-    def execute(self, arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+    def execute(self, arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
         """See `Executor`."""
         return kinematic(arena, world, command, settings)
 
@@ -92,7 +92,7 @@ class Sampled(Executor):
 
     places_feet, on_terrain = True, True
 
-    def execute(self, arena: Arena, world: World, command: Command, settings: Settings) -> Execution:
+    def execute(self, arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
         """See `Executor`."""
         return sampled(arena, world, command, settings)
 

@@ -13,11 +13,12 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.config import RENDERED as RENDERED
-from jaxbiped.mission.cycle import SENSE
-from jaxbiped.mission.settings import VISUAL, MissionConfig, Settings
-from jaxbiped.mission.state import Carriage, Mind, World
-from jaxbiped.sensing.camera import CameraConfig, Mount, mount, placed
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.mission.mission_step import SENSE
+from jaxbiped.mission.settings import VISUAL, MissionConfig, MissionParams
+from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.sensing.camera import Mount, mount, placed
+from jaxbiped.sensing.config import CameraConfig
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.noise import attitude_error
 from jaxbiped.sensing.shot import Shot
 from jaxbiped.sensing.view import Sightings, View
@@ -29,14 +30,14 @@ class Eyes(Protocol):
 
     def see(
         self,
-        world: World,
-        mind: Mind,
+        world: WorldState,
+        mind: AgentState,
         arena: Arena,
-        settings: Settings,
-        carriage: Carriage | None = None,
+        settings: MissionParams,
+        carriage: BodyPose | None = None,
         count: int | None = None,
     ) -> tuple[View, Sightings]:
-        """What each robot of a batch measures, as `cycle.sense` does: the same places, attitudes and seeds.
+        """What each robot of a batch measures, as `mission_step.sense` does: the same places, attitudes and seeds.
 
         Args:
           carriage: [B] how each robot really holds its body; None: upright, but for a tilt that is drawn.
@@ -60,23 +61,23 @@ class StereoEyes:
         Raises:
           InputError: nothing can be rendered on this machine.
         """
-        from jaxbiped.sensing.stereo.measure import StereoSensor  # loads MuJoCo, and how it renders
+        from jaxbiped.stereo.measure import StereoSensor  # loads MuJoCo, and how it renders
 
         self.sensor = StereoSensor(camera)
         self.marked, self.tracker = localisation == "landmarks", None
         if localisation in VISUAL:
-            from jaxbiped.sensing.stereo.tracking import Tracker
+            from jaxbiped.stereo.tracking import Tracker
 
             self.tracker = Tracker(self.sensor.rig)
         self.last: Shot | None = None
 
     def see(
         self,
-        world: World,
-        mind: Mind,
+        world: WorldState,
+        mind: AgentState,
         arena: Arena,
-        settings: Settings,
-        carriage: Carriage | None = None,
+        settings: MissionParams,
+        carriage: BodyPose | None = None,
         count: int | None = None,
     ) -> tuple[View, Sightings]:
         """See `Eyes`; padding gets what the last row before it gets."""
@@ -123,7 +124,7 @@ def try_eyes(config: MissionConfig) -> None:
 
 
 @jax.jit
-def view_names(world: World, mind: Mind) -> tuple[UInt32[Array, "B 6"], UInt32[Array, "B 6"]]:
+def view_names(world: WorldState, mind: AgentState) -> tuple[UInt32[Array, "B 6"], UInt32[Array, "B 6"]]:
     """What tells this view of each robot from all others of its arena, and what told the view before it; zeros before
     the first. Views of two missions that have the same name are the same."""
 
@@ -132,7 +133,7 @@ def view_names(world: World, mind: Mind) -> tuple[UInt32[Array, "B 6"], UInt32[A
         place = jax.lax.bitcast_convert_type(jnp.stack([pose.x, pose.y, pose.yaw]).astype(jnp.float32), jnp.uint32)
         return jnp.concatenate([place, jnp.stack([decision.astype(jnp.uint32), held, seed])])
 
-    def one(world: World, mind: Mind):
+    def one(world: WorldState, mind: AgentState):
         anchor = mind.anchor
         then = name(world.before, world.decisions - 1, anchor.look, anchor.squat, world.seed)
         now = name(world.pose, world.decisions, mind.look, world.squat, world.seed)
@@ -143,7 +144,7 @@ def view_names(world: World, mind: Mind) -> tuple[UInt32[Array, "B 6"], UInt32[A
 
 @jax.jit
 def where(
-    world: World, mind: Mind, settings: Settings, carriage: Carriage | None
+    world: WorldState, mind: AgentState, settings: MissionParams, carriage: BodyPose | None
 ) -> tuple[Float[Array, "B 3"], Float[Array, "B 3 3"], Mount, UInt32[Array, "B"]]:
     """Each robot's left camera, truly: its centre [m] and its axes; where it is believed to sit; the view's seed."""
 

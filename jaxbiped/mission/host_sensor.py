@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.core.host_call import host_call
+from jaxbiped.core.host_callback import host_call
 from jaxbiped.errors import InputError
 from jaxbiped.mission.sensors import Sensor, Standpoint
 from jaxbiped.sensing.view import View

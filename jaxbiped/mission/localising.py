@@ -13,19 +13,24 @@ from jaxtyping import Array, Bool, Float, UInt32
 
 from jaxbiped.arenas.arena import Arena, Landmarks
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation.kalman_filter import Belief, correct, predict_seen
+from jaxbiped.localisation.scan_match import add_walls, find_walls, match, picture_shape
 from jaxbiped.mapping import level_view
-from jaxbiped.mapping.scan_match import add_walls, find_walls, match, picture_shape
-from jaxbiped.mission.settings import ICP, VISUAL, Program, Settings
-from jaxbiped.mission.state import Anchor, Mind, World
+from jaxbiped.mission.settings import ICP, VISUAL, MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState, Anchor, WorldState
 from jaxbiped.sensing.camera import mount
-from jaxbiped.sensing.localisation import Belief, correct, predict_seen
 from jaxbiped.sensing.motion import track
 from jaxbiped.sensing.view import Sightings, View
 
 
 def localise(
-    mind: Mind, view: View, sightings: Sightings, landmarks: Landmarks, settings: Settings, program: Program
-) -> Mind:
+    mind: AgentState,
+    view: View,
+    sightings: Sightings,
+    landmarks: Landmarks,
+    settings: MissionParams,
+    program: MissionSpec,
+) -> AgentState:
     """The mind after what a view tells of the robot's pose."""
     if program.localisation == "landmarks":
         return replace(mind, belief=correct(mind.belief, landmarks, sightings))
@@ -40,7 +45,7 @@ def localise(
     return mind
 
 
-def by_motion(mind: Mind, sightings: Sightings) -> Belief:
+def by_motion(mind: AgentState, sightings: Sightings) -> Belief:
     """The belief where the motion since the last view was seen; that of dead reckoning where it was not."""
     anchor, motion = mind.anchor, sightings.motion
     belief, good = predict_seen(anchor.belief, anchor.moved, anchor.variances, motion)
@@ -49,7 +54,7 @@ def by_motion(mind: Mind, sightings: Sightings) -> Belief:
     return choose(good, Belief(pose, belief.cov), mind.belief)
 
 
-def by_walls(mind: Mind, view: View, settings: Settings, program: Program) -> Mind:
+def by_walls(mind: AgentState, view: View, settings: MissionParams, program: MissionSpec) -> AgentState:
     """The mind after the walls in view were laid onto those measured before, and were kept with them."""
     spec, image = program.spec, program.image
     flat = jax.lax.optimization_barrier(level_view(view, mind.belief.pose.z, settings.mapping, spec))
@@ -64,7 +69,7 @@ def choose(good: Bool[Array, ""], new: Belief, old: Belief) -> Belief:
     return jax.tree.map(lambda a, b: jnp.where(good, a, b), new, old)
 
 
-def carried_on(mind: Mind, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> Mind:
+def carried_on(mind: AgentState, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
     """The mind after a command, by odometry."""
     if mind.anchor is None:
         return mind
@@ -72,7 +77,13 @@ def carried_on(mind: Mind, moved: Float[Array, "3"], variances: Float[Array, "3"
 
 
 def unmarked(
-    view: View, world: World, mind: Mind, arena: Arena, settings: Settings, program: Program, seed: UInt32[Array, ""]
+    view: View,
+    world: WorldState,
+    mind: AgentState,
+    arena: Arena,
+    settings: MissionParams,
+    program: MissionSpec,
+    seed: UInt32[Array, ""],
 ) -> Sightings:
     """What a robot without landmarks sees of its own motion, as the ray-cast sensor has it.
 

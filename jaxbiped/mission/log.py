@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int8, UInt8
 
-SHORTEST = 1e-3  # [m] a shorter way is none, as in `arenas.movers`
+SHORTEST = 1e-3  # [m] a shorter way is none, as in `arenas.moving_boxes`
 KINDS = ("obstacle", "bump", "gate")  # of an outline
 MARKS = ("circle", "square")  # of a landmark
 
@@ -21,7 +21,7 @@ class Outline:
     kind: str  # one of KINDS
     bottom: float = 0.0  # [m] height of its underside
     top: float = 0.0  # [m] height of its top
-    way: tuple[float, float, float, float] | None = None  # if it moves: dx, dy, speed, phase of `arenas.movers`
+    way: tuple[float, float, float, float] | None = None  # if it moves: dx, dy, speed, phase of `arenas.moving_boxes`
 
     def moved(self, time: float) -> tuple[float, float]:
         """How far (x, y) [m] it is from its corners at a time [s] of the mission."""
@@ -61,7 +61,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Walk:
-    """How a simulated biped moved: `F` states of `physics.robot.robot_spec`, in their order."""
+    """How a simulated biped moved: `F` states of `biped.model.robot_spec`, in their order."""
 
     qpos: Float32[np.ndarray, "F 19"]  # hips (x, y, z) [m], their quaternion (w, x, y, z), 12 joint angles [rad]
     moment: Float32[np.ndarray, "F"]  # when, in moments of the log: 2.5 is half way from the third to the fourth

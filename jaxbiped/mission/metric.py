@@ -26,11 +26,11 @@ class Step:
     """One decision of one mission, after it was played."""
 
     arena: Any  # `Arena`
-    before: Any  # `World` when the robot decided
-    after: Any  # `World` after what it did
+    before: Any  # `WorldState` when the robot decided
+    after: Any  # `WorldState` after what it did
     command: Any  # `Command` that it gave
     played: Bool[Array, "*B"]  # False: the mission ended with this decision, and the robot stayed
-    settings: Any  # `Settings` of the mission
+    settings: Any  # `MissionParams` of the mission
 
 
 @jax.tree_util.register_dataclass
@@ -41,7 +41,7 @@ class MissionEnd:
     arena: Any  # `Arena`
     result: Any  # `Result`: its code, distance, time and so on
     plan: Any  # `OraclePlan`: whether a plan exists with perfect knowledge, its cost and its length
-    settings: Any  # `Settings`
+    settings: Any  # `MissionParams`
 
 
 class MetricFormat(Model):

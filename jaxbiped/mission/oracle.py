@@ -15,13 +15,13 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import planning
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.movers import only
+from jaxbiped.arenas.moving_boxes import only
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Body, Cell, truth_grid
 from jaxbiped.mission.decision import nearest_direction
 from jaxbiped.mission.goal import goal_cell
-from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.motion.selection import cell_of
 
 
@@ -37,7 +37,7 @@ class OraclePlan:
 
 @with_own_settings
 @ready_jit(static_argnames=("program",))
-def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePlan:
+def oracle_plan(arenas: Arena, settings: MissionParams, program: MissionSpec) -> OraclePlan:
     """Plans on the true class grid of each arena [A], under each of the settings [P].
 
     Boxes that move are left out. `blind_stop` has one way, the one that it plans on an empty floor; its goal is
@@ -56,7 +56,7 @@ def oracle_plan(arenas: Arena, settings: Settings, program: Program) -> OraclePl
     first_body = jax.tree.map(lambda leaf: leaf[0], settings.body)
     first_grids = grids(first_body)
 
-    def plan(setting: Settings) -> tuple[Float[Array, "A"], Float[Array, "A"]]:
+    def plan(setting: MissionParams) -> tuple[Float[Array, "A"], Float[Array, "A"]]:
         # Most studies sweep anything but the body: its true grids are made once.
         same = jnp.all(jnp.stack(jax.tree.leaves(jax.tree.map(jnp.equal, setting.body, first_body))))
         classes, levels = jax.lax.cond(same, lambda: first_grids, lambda: grids(setting.body))

@@ -6,11 +6,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import planning
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.motion.approach import foresight
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.motion.edge_approach import foresight
 from jaxbiped.motion.selection import stride
+from jaxbiped.planning.edge_clearance import rim_costs
 from jaxbiped.planning.planners import Problem
-from jaxbiped.planning.rims import rim_costs
 
 
 def pose_problem(
@@ -20,14 +20,14 @@ def pose_problem(
     ij: Int[Array, "B 2"],
     heading: Int[Array, "B"],
     yaw: Float[Array, "B"],
-    settings: Settings,
-    program: Program,
+    settings: MissionParams,
+    program: MissionSpec,
     active: Bool[Array, "B"] | None = None,
     state=None,
 ) -> Problem:
     """What the planner of each robot is asked.
 
-    Robots whose feet are placed keep off edges beside their way: `planning.rims` says what that costs.
+    Robots whose feet are placed keep off edges beside their way: `planning.edge_clearance` says what that costs.
 
     Args:
       heading: the direction nearest to `yaw` [rad].
@@ -55,12 +55,12 @@ def pose_problem(
     )
 
 
-def seconds_of_a_unit(settings: Settings) -> Float[Array, "*B"]:
+def seconds_of_a_unit(settings: MissionParams) -> Float[Array, "*B"]:
     """What a unit of Eq. 1 stands for [s], by a straight move on the floor: 8 s for the paper's costs and times."""
     return settings.durations.straight / (settings.costs.c0 + settings.costs.c1)
 
 
-def times_of(settings: Settings) -> planning.Times:
+def times_of(settings: MissionParams) -> planning.Times:
     """The durations of a mission's clock, and what C4 stands for in seconds."""
     d = settings.durations
     return planning.Times(

@@ -58,7 +58,7 @@ class Limits:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Settings:
+class MissionParams:
     """Every number that a sweep may change. All leaves are traced, scalars or with a leading batch axis."""
 
     strategy: StrategyFlags
@@ -81,7 +81,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class Program:
+class MissionSpec:
     """What sets array shapes and code paths: a mission program is compiled once for each of these. Hashable."""
 
     spec: GridSpec
@@ -94,7 +94,7 @@ class Program:
     knows_pose: bool = False  # the robot does, and its points have no attitude error to take out
 
 
-def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> Program:
+def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> MissionSpec:
     """The static part of a config for arenas of one size [m], and with such terrain, whose heights are concrete.
 
     Raises:
@@ -109,7 +109,7 @@ def program(config: MissionConfig, size_xy: tuple[float, float], terrain: Height
         raise InputError(
             f"needs a picture, and {config.sensor} measures none", field="localisation", value=config.localisation
         )
-    return Program(
+    return MissionSpec(
         config.grid(size_xy, heights),
         config.camera.image,
         config.sensor,
@@ -124,12 +124,12 @@ def program(config: MissionConfig, size_xy: tuple[float, float], terrain: Height
 PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # of strategies that bring none of their own
 
 
-def settings_of(config: MissionConfig, strategy: str | Strategy) -> Settings:
+def settings_of(config: MissionConfig, strategy: str | Strategy) -> MissionParams:
     """The traced form of a config, for one strategy or the one of a name."""
     limits = config.limits
     sd, sd_yaw = limits.start_sd
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
-    return Settings(
+    return MissionParams(
         strategy=strategy.flags(config.corner_cutting),
         planner=PLANNERS[config.planner] if strategy.planner is None else traced_component(strategy.planner),
         costs=numbers(config.costs),

@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Float64, Int
 
 from jaxbiped import physics
+from jaxbiped.biped.config import SIDES, RobotModelConfig
+from jaxbiped.biped.gait import home_table
+from jaxbiped.biped.model import FAR, add_terrain, home_qpos, part_geoms, robot_spec
 from jaxbiped.geometry.boxes import Boxes
-from jaxbiped.motion.biped import SIDES, RobotModelConfig
-from jaxbiped.motion.gait import home_table
-from jaxbiped.physics.robot import FAR, add_terrain, home_qpos, part_geoms, robot_spec
 
 FIELDS = ("geom_pos", "geom_size", "geom_quat")  # that an arena's boxes are written into
 BODY = "body"  # watch of torso and head; those of the feet are named by box

@@ -13,13 +13,13 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.localisation.kalman_filter import Belief
+from jaxbiped.localisation.scan_match import Outlines, no_outlines
 from jaxbiped.mapping import GridMap, GridSpec, empty
-from jaxbiped.mapping.scan_match import Outlines, no_outlines
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import ICP, VISUAL, Settings
+from jaxbiped.mission.settings import ICP, VISUAL, MissionParams
 from jaxbiped.sensing.edges import Edge, unknown
-from jaxbiped.sensing.localisation import Belief
 
 
 @jax.tree_util.register_dataclass
@@ -34,7 +34,7 @@ class Planned:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class World:
+class WorldState:
     """The referee's side: only sensors and executors read it, the robot never does."""
 
     pose: Pose  # where the robot stands
@@ -54,7 +54,7 @@ class World:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Carriage:
+class BodyPose:
     """How a robot really holds its body: the robot frame that its cameras are fixed to.
 
     In the home posture it is the frame of the feet; else it is that frame moved and tilted as the torso is.
@@ -80,7 +80,7 @@ class Anchor:
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
-class Mind:
+class AgentState:
     """The robot's side. The stance is known to both."""
 
     belief: Belief  # pose and its covariance; pose.z is the height of the ground that it stands on
@@ -100,8 +100,8 @@ class Mind:
 
 @with_own_settings
 def start(
-    arena: Arena, settings: Settings, seed: UInt32[Array, ""], spec: GridSpec, localisation: str = "landmarks"
-) -> tuple[World, Mind]:
+    arena: Arena, settings: MissionParams, seed: UInt32[Array, ""], spec: GridSpec, localisation: str = "landmarks"
+) -> tuple[WorldState, AgentState]:
     """One mission before its first measurement. The robot knows where it starts (paper, 2, condition 2)."""
     x, y, yaw = arena.start_xyyaw
     pose = Pose(x, y, ground_height(arena, x, y), yaw)
@@ -113,11 +113,13 @@ def start(
     none = jnp.zeros(())
     planned = Planned(none, zero, jnp.full_like(none, jnp.nan))
     metrics = begun(settings.metrics, arena, settings)
-    world = World(pose, no, none, none, zero, zero, code, seed, none, none, planned, pose if visual else None, metrics)
+    world = WorldState(
+        pose, no, none, none, zero, zero, code, seed, none, none, planned, pose if visual else None, metrics
+    )
     belief = Belief(pose, jnp.diag(settings.limits.start_variance))
     outlines = no_outlines(spec) if localisation in ICP else None
     anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None
-    return world, Mind(
+    return world, AgentState(
         belief=belief,
         grid_map=empty(spec),
         squat=no,

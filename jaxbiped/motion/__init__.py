@@ -1,6 +1,6 @@
 """What the robot plays: its primitives, and which one comes next (paper, 2.4)."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,

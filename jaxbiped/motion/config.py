@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import fields
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -15,9 +14,6 @@ if TYPE_CHECKING:
     from jaxbiped.mapping.grid import Body
     from jaxbiped.motion.primitives import Durations
     from jaxbiped.motion.robot import Footing
-
-CELL = 0.05  # [m] the length that Table 2 gives durations for
-EIGHTH = math.pi / 4  # [rad] the turn that Table 2 gives a duration for
 
 Goal = Literal["duration", "margin"]
 Length = Annotated[float, pydantic.Field(gt=0.0, le=2.0)]

@@ -10,9 +10,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxbiped.motion.config import CELL as CELL
-from jaxbiped.motion.config import EIGHTH as EIGHTH
-from jaxbiped.motion.config import DurationConfig as DurationConfig
+from jaxbiped.motion.grid_units import CELL, EIGHTH
 
 
 class Primitive(enum.IntEnum):

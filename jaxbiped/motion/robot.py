@@ -7,11 +7,6 @@ from dataclasses import dataclass
 import jax
 from jaxtyping import Array, Float
 
-from jaxbiped.motion.config import HEIGHT_TOLERANCE as HEIGHT_TOLERANCE
-from jaxbiped.motion.config import STEP_TOLERANCE as STEP_TOLERANCE
-from jaxbiped.motion.config import FootingConfig as FootingConfig
-from jaxbiped.motion.config import RobotConfig as RobotConfig
-
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)

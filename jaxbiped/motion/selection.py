@@ -10,7 +10,8 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped.geometry.pose import Pose, wrap_angle
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.motion.edge import crossing_direction
-from jaxbiped.motion.primitives import CELL, Command, Primitive
+from jaxbiped.motion.grid_units import CELL
+from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.planning import DIRECTIONS
 
 TURN_DEADBAND = 0.04  # [rad] smaller turns are not worth playing: 2 mm at the end of a cell

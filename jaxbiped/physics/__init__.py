@@ -1,11 +1,11 @@
 """Batches of simulations of any MJCF, in MuJoCo's own batch or in MJX, behind one protocol."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,
     {
         "backend": "WARNINGS Backend Rollout State explain",
-        "make": "BACKENDS make",
+        "backend_choice": "BACKENDS make",
     },
 )

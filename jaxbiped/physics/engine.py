@@ -21,7 +21,7 @@ from jaxbiped.physics.model import REPORT
 with contextlib.redirect_stdout(io.StringIO()):  # it prints that MuJoCo Warp is not installed; few need to know
     from mujoco import mjx
 
-    from jaxbiped.physics.refusals import refusals
+    from jaxbiped.physics.unsupported_features import refusals
 
 SLOTS = "max_contact_points"
 GROWS = {  # sizes of a geom that a margin adds to

@@ -1,13 +1,13 @@
 """Grid to graph costs, cost-to-go field and path; the reference A*."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,
     {
-        "astar": "AStarPath astar",
+        "heap_astar": "AStarPath astar",
         "costs": "BASE_PITCH DIRECTIONS Costs Rules edge_costs",
-        "field": "CostToGo cost_to_go field",
+        "cost_field": "CostToGo cost_to_go field",
         "gradient": "MoveCounts move_counts path_cost",
         "heading": "HeadingField Moves Times heading_field heading_moves heading_path path_time",
         "path": "Path next_step read_path",

@@ -14,8 +14,8 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped.core.batching import unfold
 from jaxbiped.core.checks import whole_number
 from jaxbiped.planning.arguments import grid_arguments
+from jaxbiped.planning.cost_field import field
 from jaxbiped.planning.costs import FORBIDDEN, IN_GATE, LEVEL, STEP, UNMEASURED, Costs, Rules, edge_costs
-from jaxbiped.planning.field import field
 from jaxbiped.planning.path import Path, path_arguments, read_path
 
 KIND = Costs(c0=0.0, c1=float(LEVEL), c2=float(IN_GATE), c3=float(STEP), c4=float(UNMEASURED))

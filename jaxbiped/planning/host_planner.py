@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped.core.host_call import host_call
+from jaxbiped.core.host_callback import host_call
 from jaxbiped.core.time_limit import TimeLimit, within
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell

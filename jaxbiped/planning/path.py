@@ -17,8 +17,8 @@ from jaxbiped.core.checks import cells, flags, integers, leading_shape, reals, w
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.arguments import grid_arguments, indices
+from jaxbiped.planning.cost_field import CostToGo
 from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, cell_kinds, kind_cost, move_kind
-from jaxbiped.planning.field import CostToGo
 
 TIE = 1e-6  # relative: ways whose costs differ by less are equally good; ten roundings of a float32
 

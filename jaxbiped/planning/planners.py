@@ -15,10 +15,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, Int8
 
 from jaxbiped.errors import InputError
+from jaxbiped.planning.cost_field import cost_to_go
+from jaxbiped.planning.cost_field import field as cost_field
 from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, cell_kinds, edge_costs, move_kind
 from jaxbiped.planning.costs import FORBIDDEN as FORBIDDEN_KIND
-from jaxbiped.planning.field import cost_to_go
-from jaxbiped.planning.field import field as cost_field
 from jaxbiped.planning.heading import HeadingField, Times, heading_field, heading_path
 from jaxbiped.planning.path import next_step, read_path
 

@@ -10,12 +10,12 @@ import polars as pl
 from matplotlib.figure import Figure
 
 from jaxbiped.errors import InputError
-from jaxbiped.mission.stepped import Mission
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.report.page import Section
+from jaxbiped.report.page_figures import WIDTH, Plot
 from jaxbiped.report.pictures import draw_map, moment
-from jaxbiped.report.plots import WIDTH, Plot
 from jaxbiped.report.style import own_style
-from jaxbiped.study.again import Origin, examples, play_again
+from jaxbiped.study.replay import Origin, examples, play_again
 
 KEY = (
     "Maps as the robots held them at the end: grey floor, blue bump with its level, purple gate, red obstacle and all "

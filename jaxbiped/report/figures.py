@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import MEASURES, SUCCESS, Measure, part, verdict
+from jaxbiped.report.answer_text import MEASURES, SUCCESS, Measure, part, verdict
 from jaxbiped.report.style import own_style
 from jaxbiped.report.words import OPEN
-from jaxbiped.study import ALL, CODES, Comparison, Estimate, Stratum, proportion
+from jaxbiped.statistics import ALL, CODES, Comparison, Estimate, Stratum, proportion
 
 # Okabe and Ito's colours, which colour-blind people tell apart: one for each strategy, in every figure.
 COLOURS = {

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rich.console import Group
 
-from jaxbiped.report.summary import Report, write_comparison_report
+from jaxbiped.report.comparison_report import Report, write_comparison_report
 from jaxbiped.report.sweep import SweepReport, write_sweep_report
 from jaxbiped.report.sweep import terminal as sweep_terminal
 from jaxbiped.report.sweep_page import write_sweep_page

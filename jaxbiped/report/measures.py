@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from jaxbiped.mission.metric import MetricFormat
-from jaxbiped.study import Comparison
+from jaxbiped.statistics import Comparison
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from importlib import resources
 import jinja2
 import polars as pl
 
-from jaxbiped.report.answer import MEASURES, answer, part, verdict
+from jaxbiped.report.answer_text import MEASURES, answer, part, verdict
 from jaxbiped.report.grid import Grid, to_grid, typeset
-from jaxbiped.report.plots import Plot, attribution_sheet, plots
+from jaxbiped.report.page_figures import Plot, attribution_sheet, plots
 from jaxbiped.report.tables import (
     code_sheet,
     metric_sheet,
@@ -23,7 +23,8 @@ from jaxbiped.report.tables import (
     success_sheet,
 )
 from jaxbiped.report.words import OPEN, number, signed
-from jaxbiped.study import Comparison, Manifest
+from jaxbiped.statistics import Comparison
+from jaxbiped.study import Manifest
 
 PAGE = "report.html"
 

@@ -14,14 +14,14 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from rich.console import Group
 
+from jaxbiped.biped.gait import PrimitiveTable
 from jaxbiped.files import write_whole
 from jaxbiped.mission.library import LibraryConfig
-from jaxbiped.motion.gait import PrimitiveTable
-from jaxbiped.report.library import displacement
+from jaxbiped.report.library_file import displacement
 from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.report.words import NONE, number, percent, signed
-from jaxbiped.study.intervals import proportion
+from jaxbiped.statistics.intervals import proportion
 
 Tables = Mapping[str, PrimitiveTable]
 FACTORS = {  # disturbances by themselves: heading, unit, and the value of none

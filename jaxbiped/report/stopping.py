@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jaxbiped.report.answer import MEASURES
+from jaxbiped.report.answer_text import MEASURES
 from jaxbiped.report.words import signed
 from jaxbiped.study.stopping import read_stopping
 

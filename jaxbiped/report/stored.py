@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jaxbiped.report.answer import MEASURES, Measure
+from jaxbiped.report.answer_text import MEASURES, Measure
 from jaxbiped.report.tables import (
     Sheet,
     code_sheet,
@@ -17,9 +17,9 @@ from jaxbiped.report.tables import (
     success_sheet,
 )
 from jaxbiped.report.words import NONE, brackets, p_cell, percent, signed
-from jaxbiped.study.comparison import Comparison
-from jaxbiped.study.equivalence import Equivalence
-from jaxbiped.study.pilot import Plan
+from jaxbiped.statistics.comparison import Comparison
+from jaxbiped.statistics.equivalence import Equivalence
+from jaxbiped.statistics.sample_size_plan import Plan
 
 BY_NAME = {measure.name: measure for measure in MEASURES}
 

@@ -11,15 +11,16 @@ from rich.console import Group
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import MEASURES, Measure
+from jaxbiped.report.answer_text import MEASURES, Measure
 from jaxbiped.report.figures import saver
 from jaxbiped.report.sweep_answer import difference, sentences
 from jaxbiped.report.sweep_figures import sweep_figure
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.report.words import NONE, brackets, number, percent
-from jaxbiped.study import CODES, Manifest, read, read_points
-from jaxbiped.study.idle_axes import idle_spans
-from jaxbiped.study.pointwise import PointResult, SweepResult, pointwise
+from jaxbiped.statistics import CODES
+from jaxbiped.statistics.idle_axes import idle_spans
+from jaxbiped.statistics.sweep_points import PointResult, SweepResult, pointwise
+from jaxbiped.study import Manifest, read, read_points
 
 SUMMARY, FIGURE = "summary.md", "sweep.png"
 ROWS = 24  # of a table on a terminal

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from jaxbiped.report.answer import MEASURES, Measure, listed, part
+from jaxbiped.report.answer_text import MEASURES, Measure, listed, part
 from jaxbiped.report.words import NONE, brackets, signed
-from jaxbiped.study import Estimate, PairComparison
-from jaxbiped.study.idle_axes import IdleSpan
-from jaxbiped.study.pointwise import PointResult, SweepResult
+from jaxbiped.statistics import Estimate, PairComparison
+from jaxbiped.statistics.idle_axes import IdleSpan
+from jaxbiped.statistics.sweep_points import PointResult, SweepResult
 
 
 def sentences(result: SweepResult, idle: Sequence[IdleSpan] = ()) -> tuple[str, ...]:

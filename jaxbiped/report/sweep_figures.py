@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from jaxbiped.report.answer import MEASURES, SUCCESS, TIME, Measure, part
+from jaxbiped.report.answer_text import MEASURES, SUCCESS, TIME, Measure, part
 from jaxbiped.report.figures import INK, error_bars, legend_above, look, style
 from jaxbiped.report.style import own_style
-from jaxbiped.study import Estimate
-from jaxbiped.study.pointwise import PointResult, SweepResult
+from jaxbiped.statistics import Estimate
+from jaxbiped.statistics.sweep_points import PointResult, SweepResult
 
 RATIO = 8.0  # greatest over least value from which an axis is drawn on a log scale
 BETTER_UP, BETTER_DOWN = "RdBu", "RdBu_r"  # around zero: blue where the first strategy is better

@@ -11,19 +11,20 @@ from matplotlib.figure import Figure
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.report.answer import DISTANCE, TIME, listed
+from jaxbiped.report.answer_text import DISTANCE, TIME, listed
+from jaxbiped.report.comparison_report import LIMITATIONS, looked_at
 from jaxbiped.report.figures import INK, canvas, error_bars, legend_above, look
 from jaxbiped.report.grid import to_grid, typeset
-from jaxbiped.report.own_metric import own_metric
+from jaxbiped.report.metric_figure import own_metric
 from jaxbiped.report.page import PAGE, Section, page_of, render
-from jaxbiped.report.plots import WIDTH, Plot
-from jaxbiped.report.summary import LIMITATIONS, looked_at
+from jaxbiped.report.page_figures import WIDTH, Plot
 from jaxbiped.report.svg import inline, themed
 from jaxbiped.report.sweep import LIMITATIONS as OF_SWEEPS
 from jaxbiped.report.sweep import SweepReport, grid_axes
 from jaxbiped.report.sweep_figures import Panel, difference_panels, dots, heat_map, rate_panels, scale_x
-from jaxbiped.study import compare, read
-from jaxbiped.study.pointwise import PointResult, SweepResult
+from jaxbiped.statistics import compare
+from jaxbiped.statistics.sweep_points import PointResult, SweepResult
+from jaxbiped.study import read
 
 MOST_ROWS = 256  # of a table: beyond, the page says where the others are
 

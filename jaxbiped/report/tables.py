@@ -10,10 +10,10 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from jaxbiped.report.answer import ALPHA, DISTANCE, MEASURES, SUCCESS, TIME, answer, part
-from jaxbiped.report.measures import metric_measures
+from jaxbiped.report.answer_text import ALPHA, DISTANCE, MEASURES, SUCCESS, TIME, answer, part
+from jaxbiped.report.measures import Measure, metric_measures
 from jaxbiped.report.words import NONE, brackets, number, p_cell, percent, signed
-from jaxbiped.study import ALL, CODES, Comparison, Estimate, PairComparison, PairedMetric
+from jaxbiped.statistics import ALL, CODES, Comparison, Estimate, PairComparison, PairedMetric
 
 Row = tuple[str, ...]
 MEANING = {

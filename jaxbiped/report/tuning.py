@@ -14,9 +14,9 @@ from jaxbiped.report.figures import GRID, INK, saver, style
 from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown
 from jaxbiped.report.words import NONE, brackets, number, percent, signed
+from jaxbiped.statistics.intervals import Estimate
 from jaxbiped.study.durations import Fit
-from jaxbiped.study.intervals import Estimate
-from jaxbiped.study.tune import DURATIONS, START, SWEPT, TUNED, Gap, TuneConfig, Tuning
+from jaxbiped.study.tuning import DURATIONS, START, SWEPT, TUNED, Gap, TuneConfig, Tuning
 
 PAPER = (1.0, 1.0, 5.0, 10.0)  # C0 to C3
 COLOURS = {"c1": "#0072B2", "c2": "#CC79A7", "c3": "#D55E00", "c4": "#009E73"}

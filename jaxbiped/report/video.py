@@ -12,14 +12,14 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from jaxbiped.biped.config import RobotModelConfig
+from jaxbiped.biped.gait import PrimitiveTable
+from jaxbiped.biped.trial import SETTLE, Disturbance, boxes_of, lay_out, passes_gate
+from jaxbiped.biped.verify import roll, trial_spec
 from jaxbiped.errors import InputError
 from jaxbiped.files import write_whole
-from jaxbiped.motion.biped import RobotModelConfig
-from jaxbiped.motion.gait import PrimitiveTable
 from jaxbiped.physics.native import Native
 from jaxbiped.physics.native import Options as NativeOptions
-from jaxbiped.physics.trial import SETTLE, Disturbance, boxes_of, lay_out, passes_gate
-from jaxbiped.physics.verify import roll, trial_spec
 
 SIZE = (400, 300)  # [px] width and height
 FRAMES_PER_SECOND, LONGEST = 10.0, 6.0  # [1/s], [s] of a video: what takes longer is played faster

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from jaxbiped.study import Estimate
+from jaxbiped.statistics import Estimate
 
 NONE = "-"
 AHEAD, BEHIND, OPEN = "ahead", "behind", "open"

@@ -1,9 +1,9 @@
-"""What the robot measures: points, landmarks, its own motion, and from these its pose.
+"""What the robot measures: points, landmarks and its own motion.
 
 Functions are written for one arena; the mission maps them.
 """
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,
@@ -11,7 +11,6 @@ lazy_package(
         "camera": "Camera ImageSpec",
         "config": "CameraConfig LandmarkConfig NoiseConfig OdometryConfig VisualConfig",
         "landmarks": "LandmarkNoise sight:sight_landmarks",
-        "localisation": "Belief correct known predict",
         "motion": "VisualNoise",
         "noise": "StereoNoise",
         "odometry": "OdometryNoise drift",

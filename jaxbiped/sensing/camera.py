@@ -18,7 +18,6 @@ from jaxbiped.core import checks
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.geometry.small import matrix, product
-from jaxbiped.sensing.config import CameraConfig as CameraConfig
 
 LEAST = 1e-6  # of what must be above 0 in a camera
 

@@ -21,15 +21,12 @@ from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.geometry.rays import cast_boxes, key, nearness
-from jaxbiped.sensing import hashing
+from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec, check_camera, mount, placed
-from jaxbiped.sensing.config import LandmarkConfig as LandmarkConfig
-from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.sensing.view import Sightings
 
 LANDMARK = 4  # channel of a view's seed
 HIDDEN_MARGIN = 1e-3  # relative: a box, or the ground, that only touches the landmark does not hide it
-RENDERED, IDEAL, REAL = (PRESETS[name].landmarks for name in ("rendered", "ideal", "real"))
 
 
 @jax.tree_util.register_dataclass
@@ -87,7 +84,7 @@ def sight(
     furthest = jnp.where(marks.kind == SQUARE, noise.furthest_square, noise.furthest_circle)
     seen = marks.used & in_view & ~hidden & (distance >= noise.nearest) & (distance <= furthest)
     sd = noise.sd + noise.sd_per_metre * distance
-    error = hashing.normal(seed, np.arange(2 * marks.x.shape[0]), LANDMARK).reshape(2, -1) * sd
+    error = counter_rng.normal(seed, np.arange(2 * marks.x.shape[0]), LANDMARK).reshape(2, -1) * sd
     return Sightings(
         x=jnp.where(seen, forward + error[0], 0.0),
         y=jnp.where(seen, left + error[1], 0.0),

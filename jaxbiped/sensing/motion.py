@@ -1,6 +1,6 @@
 """Visual odometry of the ray-cast sensor: what a camera tells of the robot's own motion from one view to the next.
 
-`sensing.stereo.tracking` measures it in pictures. Here is a model of that: it takes points that both views show, and
+`stereo.tracking` measures it in pictures. Here is a model of that: it takes points that both views show, and
 has errors of the size that rendered pictures have.
 """
 
@@ -15,9 +15,8 @@ from jaxtyping import Array, Float, UInt32
 
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
-from jaxbiped.sensing import hashing
+from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
-from jaxbiped.sensing.config import VisualConfig as VisualConfig
 from jaxbiped.sensing.view import Motion, View
 
 VISUAL = 6  # channel of a view's seed
@@ -69,8 +68,8 @@ def track(
     share = overlap(view, pose, before, at, camera, image, max_range)
     shrink = jnp.sqrt(SHARE / jnp.maximum(share, LEAST_SHARE))
     sd = jnp.stack([noise.forward, noise.left, noise.yaw]) * shrink
-    error = sd * hashing.normal(seed, np.arange(3), VISUAL)
-    lucky = hashing.uniform(seed, 3, VISUAL) >= noise.failure
+    error = sd * counter_rng.normal(seed, np.arange(3), VISUAL)
+    lucky = counter_rng.uniform(seed, 3, VISUAL) >= noise.failure
     x, y = to_robot(before, pose.x, pose.y)
     yaw = wrap_angle(pose.yaw - before.yaw)
     seen = (share >= noise.least_share) & lucky & jnp.isfinite(x + y + yaw)

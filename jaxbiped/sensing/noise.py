@@ -18,16 +18,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, UInt32
 
-from jaxbiped.sensing import hashing
+from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec
-from jaxbiped.sensing.config import NoiseConfig as NoiseConfig
-from jaxbiped.sensing.presets import PRESETS
 
 MATCH, PHANTOM, ATTITUDE = 1, 2, 3  # channels of a view's seed
 HIDING_REACH = 128  # [px] how far to the right of a pixel something may hide it
 PHANTOM_BLOCK = 12  # [px] size of a clump of phantoms
 LEAST_WIDTH = 1e-2  # [px] in the right image, of one in the left: what turns away further is seen by none
-RENDERED, IDEAL, REAL = (PRESETS[name].stereo for name in ("rendered", "ideal", "real"))
 
 
 @jax.tree_util.register_dataclass
@@ -58,7 +55,7 @@ class StereoNoise:
 
 def attitude_error(noise: StereoNoise, seed: UInt32[Array, ""]) -> tuple[Float[Array, ""], Float[Array, ""]]:
     """Roll and pitch [rad] of the robot in the view of this seed."""
-    draw = hashing.normal(seed, np.arange(2), ATTITUDE) * noise.attitude_sd
+    draw = counter_rng.normal(seed, np.arange(2), ATTITUDE) * noise.attitude_sd
     return draw[0], draw[1]
 
 
@@ -94,8 +91,8 @@ def match(
     near = d > camera.max_disparity
     # Its noise.
     counters = np.arange(4 * image.rows * image.columns, dtype=np.uint32).reshape(4, *shape)
-    match_seed = hashing.fold(seed, MATCH)
-    chance = hashing.bits(match_seed, counters[0])
+    match_seed = counter_rng.fold(seed, MATCH)
+    chance = counter_rng.bits(match_seed, counters[0])
     lost = jnp.where(grazing, noise.drop_grazing, jnp.where(edge, noise.drop_edge, noise.drop_plain))
     if noise.stretch_kept is not None:
         over = (stretch(across, to_right) - noise.stretch_kept) / (noise.stretch_lost - noise.stretch_kept)
@@ -108,7 +105,7 @@ def match(
     error = noise.bias + noise.sd * (1 + noise.slope_gain * across) * correlated(match_seed, image, noise.correlation)
     measured = d + jnp.where(swapped, beyond, 0.0) + error
     # Phantoms: one chance and one wild disparity for each clump.
-    clump = hashing.bits(hashing.fold(seed, PHANTOM), clumps(image))
+    clump = counter_rng.bits(counter_rng.fold(seed, PHANTOM), clumps(image))
     wild = 1 + half(clump) * (camera.max_disparity - 1)
     share = jnp.where(near, noise.phantom_near, jnp.where(hidden, noise.phantom_hidden, 0.0))
     phantom = half(clump >> np.uint32(16)) < share
@@ -163,7 +160,7 @@ def correlated(
     r = jnp.maximum(correlation, 1e-6)
     c = (1 - jnp.sqrt(jnp.maximum(1 - 4 * r * r, 0.0))) / (2 * r)
     shape = (image.rows + 1, image.columns + 1)
-    white = hashing.normal(seed, np.arange(shape[0] * shape[1], dtype=np.uint32).reshape(shape), 1)
+    white = counter_rng.normal(seed, np.arange(shape[0] * shape[1], dtype=np.uint32).reshape(shape), 1)
     mixed = white[:, :-1] + c * white[:, 1:]
     return (mixed[:-1] + c * mixed[1:]) / (1 + c * c)
 

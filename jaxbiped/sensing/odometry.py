@@ -18,8 +18,7 @@ from jaxtyping import Array, Float, UInt32
 
 from jaxbiped.core.checks import finite
 from jaxbiped.core.signatures import checked
-from jaxbiped.sensing import hashing
-from jaxbiped.sensing.config import OdometryConfig as OdometryConfig
+from jaxbiped.sensing import counter_rng
 
 ODOMETRY = 5  # channel of a step's seed
 
@@ -58,5 +57,5 @@ def drift(
     walked, turned = jnp.sqrt(dx * dx + dy * dy), jnp.abs(dyaw)
     yaw = noise.yaw_walked * noise.yaw_walked * walked + noise.yaw_turned * noise.yaw_turned * turned
     variances = jnp.stack([noise.forward * noise.forward * walked, noise.lateral * noise.lateral * walked, yaw])
-    error = jnp.sqrt(variances) * hashing.normal(seed, np.arange(3), ODOMETRY)
+    error = jnp.sqrt(variances) * counter_rng.normal(seed, np.arange(3), ODOMETRY)
     return (dx + error[0], dy + error[1], dyaw + error[2]), variances

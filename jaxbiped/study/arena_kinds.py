@@ -10,8 +10,8 @@ from jaxtyping import Int
 
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.arenas.source import OwnFamily, size_of, terrain_of
+from jaxbiped.core.names import FAMILIES
 from jaxbiped.geometry.height_field import HeightField
-from jaxbiped.study.names import FAMILIES
 
 
 @dataclass(frozen=True)

@@ -28,16 +28,16 @@ from distributed.core import rpc
 from distributed.scheduler import KilledWorker
 from distributed.versions import VersionMismatchWarning
 
+from jaxbiped.core.names import KNOWN
 from jaxbiped.core.registry import PLACE
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
-from jaxbiped.mission.queue import Tally
-from jaxbiped.study import evaluate, worker
+from jaxbiped.mission.batched_driver import Tally
+from jaxbiped.study import evaluation, worker
+from jaxbiped.study.batching import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import Progress
-from jaxbiped.study.groups import Group, Point, Shard, groups_of, shards
-from jaxbiped.study.names import KNOWN
+from jaxbiped.study.evaluation import Progress
 from jaxbiped.study.worker import Compute
 
 ANSWER = 5.0  # [s] for the scheduler to answer
@@ -62,7 +62,7 @@ class Cluster:
         are computed also: the scheduler or all workers are gone, or several workers died of one shard.
     """
 
-    def __init__(self, client: Client, *, ordered: bool = False, compute: Compute = evaluate.compute):
+    def __init__(self, client: Client, *, ordered: bool = False, compute: Compute = evaluation.compute):
         self.client, self.ordered, self.compute = client, ordered, compute
         self.address = client.scheduler.address
         self.compiling: dict[str, float] = {}  # [s] of each worker

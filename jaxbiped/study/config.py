@@ -9,12 +9,12 @@ import tyro
 
 from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
+from jaxbiped.core.names import BUILT_IN_METRICS, FAMILIES, KNOWN, METRICS, MOVING, STRATEGIES
 from jaxbiped.core.registry import FAMILIES as FAMILIES_OWN
 from jaxbiped.core.registry import METRICS as METRICS_OWN
 from jaxbiped.core.registry import STRATEGIES as REGISTERED
 from jaxbiped.core.registry import known_name
 from jaxbiped.mission.config import SIMULATED, MissionConfig
-from jaxbiped.study.names import BUILT_IN_METRICS, FAMILIES, KNOWN, METRICS, MOVING, STRATEGIES
 
 OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # what the names of components' numbers begin with
 

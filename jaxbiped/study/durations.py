@@ -12,7 +12,9 @@ from jaxtyping import Float
 from scipy.optimize import nnls
 
 from jaxbiped.mission.library import LibraryConfig
-from jaxbiped.motion.primitives import CELL, Command, DurationConfig, Primitive, duration
+from jaxbiped.motion.config import DurationConfig
+from jaxbiped.motion.grid_units import CELL
+from jaxbiped.motion.primitives import Command, Primitive, duration
 
 FLOOR_CELL = 2.0  # what a straight move on the floor costs in the paper: C0 + C1
 KINDS = {  # primitive: which of C1 to C3 its move pays, and how it climbs

@@ -13,12 +13,13 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.config import field_docs
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.eyes import StereoEyes, where
-from jaxbiped.mission.settings import MissionConfig, Settings, program
-from jaxbiped.sensing.camera import CameraConfig, Mount
-from jaxbiped.sensing.landmarks import LandmarkConfig, sight
+from jaxbiped.mission.settings import MissionConfig, MissionParams, program
+from jaxbiped.sensing.camera import Mount
+from jaxbiped.sensing.config import CameraConfig, LandmarkConfig
+from jaxbiped.sensing.landmarks import sight
 from jaxbiped.sensing.presets import RayConfig, SensorConfig
-from jaxbiped.sensing.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
-from jaxbiped.sensing.stereo.fit_landmarks import Sight, fit_landmarks
+from jaxbiped.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
+from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
 from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, standing, with_rays
 
 CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # at which the least one that can be matched is looked for
@@ -97,7 +98,7 @@ def fewest_rays(places: Sequence[Place], eyes: StereoEyes, config: MissionConfig
 
 
 def eye(
-    place: Place, number: int, settings: Settings, config: MissionConfig
+    place: Place, number: int, settings: MissionParams, config: MissionConfig
 ) -> tuple[np.ndarray, np.ndarray, Mount, int]:
     """Where the camera really is in view `number` of a place, where it is believed to sit, and the view's seed."""
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
@@ -107,14 +108,16 @@ def eye(
     return origin, basis, at, int(drawn)
 
 
-def watch_from(place: Place, number: int, eyes: StereoEyes, settings: Settings, config: MissionConfig) -> Watched:
+def watch_from(place: Place, number: int, eyes: StereoEyes, settings: MissionParams, config: MissionConfig) -> Watched:
     """The matcher in one view."""
     origin, basis, _, seed = eye(place, number, settings, config)
     eyes.sensor.show(place.arena)
     return watch(eyes.sensor, origin, basis, int(seed))
 
 
-def landmarks_of(place: Place, number: int, eyes: StereoEyes, settings: Settings, config: MissionConfig) -> list[Sight]:
+def landmarks_of(
+    place: Place, number: int, eyes: StereoEyes, settings: MissionParams, config: MissionConfig
+) -> list[Sight]:
     """Landmarks that lie in view of both cameras, found or not."""
     pose = place.poses[number]
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
@@ -130,7 +133,7 @@ def landmarks_of(place: Place, number: int, eyes: StereoEyes, settings: Settings
     return sights
 
 
-def in_view(arena: Arena, pose: Pose, settings: Settings, config: MissionConfig):
+def in_view(arena: Arena, pose: Pose, settings: MissionParams, config: MissionConfig):
     """Landmarks whose centres both cameras see, at whatever range."""
     return jax.device_get(
         sight_all(arena, pose, settings.camera, NEVER_FURTHER.traced(), config.camera.image, jnp.uint32(0))
@@ -141,7 +144,7 @@ sight_all = jax.jit(sight, static_argnames=("image",))
 
 
 def least_contrast(
-    places: Sequence[Place], eyes: StereoEyes, settings: Settings, config: MissionConfig
+    places: Sequence[Place], eyes: StereoEyes, settings: MissionParams, config: MissionConfig
 ) -> tuple[float, float]:
     """Contrast at which half as much is measured as at `CONTRASTS[-1]`; and the share that is measured at none."""
     shares = []

@@ -14,22 +14,22 @@ from jaxtyping import Array, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, ending, no_results
 from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import OnProgress, Result, Tally, ending, no_results
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.stepped import run_bare
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.mission.recorded_driver import run_bare
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.sensing.config import CameraConfig
 
 
 @with_own_settings
 def run_on_host(
     batch: Arena,
     seeds: UInt32[Array, "A"],
-    points: Settings,
+    points: MissionParams,
     count: int,
-    static: Program,
+    static: MissionSpec,
     on_progress: OnProgress,
     open_eyes: Callable[[], AbstractContextManager[Eyes]],
     population_of: Int[np.ndarray, "P"],

@@ -15,17 +15,17 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.sizes import ARENAS, JOBS, POINTS, fill_up, filled
 from jaxbiped.devices import cores, mesh_of
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.queue import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
-from jaxbiped.mission.settings import Program, Settings
+from jaxbiped.mission.batched_driver import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
+from jaxbiped.mission.settings import MissionParams, MissionSpec
 
 
 @with_own_settings
 def run_all(
     batch: Arena,
     seeds: UInt32[Array, "A"],
-    points: Settings,
+    points: MissionParams,
     count: int,
-    static: Program,
+    static: MissionSpec,
     on_progress: OnProgress,
     workers: int | None = None,
     slots: int = SLOTS,
@@ -80,7 +80,7 @@ def run_all(
 
 
 def run_threads(
-    work: Work, batch: Arena, points: Settings, hands: Sequence[Jobs], on_progress: OnProgress
+    work: Work, batch: Arena, points: MissionParams, hands: Sequence[Jobs], on_progress: OnProgress
 ) -> list[Result]:
     """Work off queues at once, a thread each."""
     tallies, lock = [Tally(0, 0)] * len(hands), threading.Lock()

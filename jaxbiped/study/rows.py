@@ -9,11 +9,11 @@ import polars as pl
 from jaxtyping import Int
 
 from jaxbiped.arenas.arena import Arena
+from jaxbiped.mission.batched_driver import Result
 from jaxbiped.mission.oracle import OraclePlan
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Result
-from jaxbiped.study.groups import Group
-from jaxbiped.study.schema import SCHEMA
+from jaxbiped.statistics.schema import SCHEMA
+from jaxbiped.study.batching import Group
 
 LABELS = np.array([code.label for code in Code if code != Code.RUNNING])  # by code
 

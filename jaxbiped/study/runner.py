@@ -14,14 +14,14 @@ from jaxtyping import Array, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.component import traced_component, with_numbers
 from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.mission.batched_driver import Result
 from jaxbiped.mission.eyes import Eyes, eyes_for
-from jaxbiped.mission.program_for import program_for
-from jaxbiped.mission.queue import Result
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, Program, Settings
-from jaxbiped.mission.stepped import Mission, Played, run_logged
+from jaxbiped.mission.recorded_driver import Mission, Played, run_logged
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy
-from jaxbiped.sensing.hashing import from_key
-from jaxbiped.study.groups import Group, numbers_under
+from jaxbiped.mission.terrain_check import program_for
+from jaxbiped.sensing.counter_rng import from_key
+from jaxbiped.study.batching import Group, numbers_under
 
 
 def noise_of(seed: int) -> UInt32[Array, ""]:
@@ -35,8 +35,8 @@ def noise_of_word(seed: UInt32[Array, ""]) -> UInt32[Array, ""]:
     return from_key(jax.random.key(seed))
 
 
-def program_of(config: MissionConfig, arena: Arena) -> Program:
-    """The static part of missions in one arena; see `mission.program_for`."""
+def program_of(config: MissionConfig, arena: Arena) -> MissionSpec:
+    """The static part of missions in one arena; see `terrain_check.program_for`."""
     return program_for(config, tuple(round(float(side), 6) for side in np.asarray(arena.size_xy)), arena.terrain)
 
 
@@ -47,7 +47,7 @@ def check_mission(config: MissionConfig) -> None:
       InputError: a biped that cannot play its primitives, a device or a renderer that is not there.
     """
     if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import rehearse  # loads MuJoCo
+        from jaxbiped.mission.simulated_driver import rehearse  # loads MuJoCo
 
         rehearse(config)
 
@@ -85,13 +85,13 @@ def play_one(
     settings = numbered(config.settings(strategy), strategy, numbers or {})
     arguments = arena, settings, noise, program_of(config, arena)
     if config.executor in SIMULATED:
-        from jaxbiped.mission.walking import walk_logged  # loads MuJoCo
+        from jaxbiped.mission.simulated_driver import walk_logged  # loads MuJoCo
 
         return walk_logged(*arguments, config=config.walk, on_decision=on_decision, eyes=eyes)
     return run_logged(*arguments, on_decision=on_decision, eyes=eyes)
 
 
-def numbered(settings: Settings, strategy: str | Strategy, numbers: Mapping[str, float]) -> Settings:
+def numbered(settings: MissionParams, strategy: str | Strategy, numbers: Mapping[str, float]) -> MissionParams:
     """Settings of a strategy with other numbers of its components."""
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
     changed = {"sensor": settings.sensor, "executor": settings.executor, "planner": strategy.planner}

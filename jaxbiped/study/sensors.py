@@ -18,15 +18,15 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
-from jaxbiped.mission.cycle import sense
 from jaxbiped.mission.eyes import Eyes
+from jaxbiped.mission.mission_step import sense
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig, Program, Settings, program
-from jaxbiped.mission.state import Mind, World, start
-from jaxbiped.mission.stepped import run_bare
+from jaxbiped.mission.recorded_driver import run_bare
+from jaxbiped.mission.settings import MissionConfig, MissionParams, MissionSpec, program
+from jaxbiped.mission.state import AgentState, WorldState, start
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.view import View
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 
 AREA = (SIZE_X, SIZE_Y)
 AWAY = (0.25, 0.80)  # [m] before what a view is aimed at
@@ -108,7 +108,7 @@ def looking(config: MissionConfig, eyes: Eyes | None) -> Look:
 
 @with_own_settings
 @partial(jax.jit, static_argnames=("program",))
-def measured(world: World, mind: Mind, arena: Arena, settings: Settings, program: Program):
+def measured(world: WorldState, mind: AgentState, arena: Arena, settings: MissionParams, program: MissionSpec):
     """What a sensor that is JAX measures."""
     return jax.vmap(partial(sense, program=program, carriage=None))(world, mind, arena, settings)
 
@@ -116,8 +116,8 @@ def measured(world: World, mind: Mind, arena: Arena, settings: Settings, program
 @with_own_settings
 @partial(jax.jit, static_argnames=("program",))
 def standing(
-    arena: Arena, settings: Settings, seed: UInt32[Array, "1"], pose: Pose, number: Array, program: Program
-) -> tuple[World, Mind]:
+    arena: Arena, settings: MissionParams, seed: UInt32[Array, "1"], pose: Pose, number: Array, program: MissionSpec
+) -> tuple[WorldState, AgentState]:
     """A robot that stands at a pose and knows it, before its measurement of this number."""
     world, mind = jax.vmap(start, in_axes=(0, 0, 0, None))(arena, settings, seed, program.spec)
     pose = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], pose)

@@ -9,7 +9,7 @@ import polars as pl
 
 from jaxbiped.config import Model, load_toml, parse
 from jaxbiped.files import write_whole
-from jaxbiped.study.sequential import MEASURES, Goal, Watch, enough, look
+from jaxbiped.statistics.sequential import MEASURES, Goal, Watch, enough, look
 
 STOPPING = "stopping.toml"
 

@@ -5,7 +5,7 @@
     <folder>/rows/part-00000.parquet  the rows of one block of arenas, or of another unit that the writer numbers
 
 Every file is whole or not there; a shard that is there is done. A study that was stopped is therefore its manifest and
-some of its shards, and the numbers of those that are missing say what is left to do (`study.resume`).
+some of its shards, and the numbers of those that are missing say what is left to do (`study.resumption`).
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ from jaxbiped.config import Model, config_hash
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
 from jaxbiped.mission.metric import MetricFormat
+from jaxbiped.statistics.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
-from jaxbiped.study.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
 from jaxbiped.terminal import command_line
 
 POINTS, ROWS = "points.parquet", "rows"

@@ -13,14 +13,14 @@ import tyro
 
 from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
 from jaxbiped.config import Model
+from jaxbiped.core.names import KNOWN
 from jaxbiped.errors import InputError
 from jaxbiped.mission.config import MissionConfig
 from jaxbiped.study.axes import Axis, Sobol, told
 from jaxbiped.study.config import OF_COMPONENTS, StudyConfig
-from jaxbiped.study.names import KNOWN
 
 if TYPE_CHECKING:
-    from jaxbiped.study.groups import Point
+    from jaxbiped.study.batching import Point
 
 POPULATION = "population"
 OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # numbers that may be left out
@@ -68,7 +68,7 @@ class SweepConfig(StudyConfig):
             alone or with the others of its point; more points than memory holds.
         """
         from jaxbiped.arenas.families import SIZE_X, SIZE_Y
-        from jaxbiped.study.memory import most_points
+        from jaxbiped.study.memory_limit import most_points
 
         fields = self.fields()
         if self.size() > (most := most_points(len(self.strategies))):
@@ -125,7 +125,7 @@ def point_at(
       size_xy: [m] of all arenas, which its pitch must divide; None: that is looked at when they are known.
     """
     from jaxbiped.mission.settings import program
-    from jaxbiped.study.groups import Point
+    from jaxbiped.study.batching import Point
 
     own = {}
     for name, value in values.items():

@@ -17,11 +17,11 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.devices import cores
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
-from jaxbiped.mission.settings import MissionConfig, Settings, program
+from jaxbiped.mission.settings import MissionConfig, MissionParams, program
 from jaxbiped.planning import Costs
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 
 VECTORS, BLOCK = 8, 16  # cost vectors and arenas that one queue has room for
 SLOTS = 16  # missions at once: a queue that is not much longer than its slots idles most of them at its end
@@ -65,7 +65,7 @@ class Trials:
             if stop.is_set():
                 raise InterruptedError
 
-        def deal(piece: tuple[int, int]) -> tuple[Work, tuple[Arena, Settings, Jobs], tuple[slice, slice]]:
+        def deal(piece: tuple[int, int]) -> tuple[Work, tuple[Arena, MissionParams, Jobs], tuple[slice, slice]]:
             first, vector = piece
             here, vectors = index[first : first + BLOCK], costs[vector : vector + VECTORS]
             batch, seeds = draw(key, jnp.asarray(np.resize(here, BLOCK)), self.families)

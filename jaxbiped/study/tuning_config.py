@@ -8,9 +8,9 @@ import pydantic
 import tyro
 
 from jaxbiped.config import Model
+from jaxbiped.core.names import FAMILIES, STRATEGIES
 from jaxbiped.mission.config import RENDERED, SIMULATED, MissionConfig
 from jaxbiped.study.config import Family
-from jaxbiped.study.names import FAMILIES, STRATEGIES
 
 Plans = Literal[tuple(name for name in STRATEGIES if name != "blind_stop")]
 Positive = Annotated[int, pydantic.Field(ge=1, le=100_000_000)]

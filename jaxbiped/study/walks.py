@@ -9,20 +9,20 @@ from jaxtyping import Array, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result
 from jaxbiped.mission.eyes import Eyes
-from jaxbiped.mission.footwork import WalkConfig
-from jaxbiped.mission.queue import Jobs, OnProgress, Result
-from jaxbiped.mission.settings import Program, Settings
-from jaxbiped.mission.walking import walk
+from jaxbiped.mission.primitive_schedule import WalkConfig
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.simulated_driver import walk
 
 
 @with_own_settings
 def walk_all(
     batch: Arena,
     seeds: UInt32[Array, "A"],
-    points: Settings,
+    points: MissionParams,
     count: int,
-    static: Program,
+    static: MissionSpec,
     on_progress: OnProgress,
     config: WalkConfig,
     population_of: Int[np.ndarray, "P"],

@@ -13,10 +13,10 @@ from distributed import get_worker
 from distributed.versions import get_package_info
 
 from jaxbiped.errors import InputError
-from jaxbiped.mission.queue import Tally
+from jaxbiped.mission.batched_driver import Tally
+from jaxbiped.study.batching import Group, Shard
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import Group, Shard
 
 PACKAGES = ("jaxbiped", "jax", "jaxlib", "numpy", "mujoco", "distributed")  # of one version everywhere, and Python
 PAUSE = 1.0  # [s] between two words on how far a shard is

@@ -12,7 +12,7 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.api.study import numbers_of_axis
 from jaxbiped.arenas import sample
-from jaxbiped.study.comparison import strata
+from jaxbiped.statistics.comparison import strata
 
 FILES = sorted((Path(__file__).parents[2] / "configs" / "scenes").glob("experiment_*.toml"))
 

@@ -15,7 +15,7 @@ from jaxbiped.arenas import sample
 from jaxbiped.core.registry import METRICS
 from jaxbiped.mission.metric import format_of
 from jaxbiped.report.measures import metric_measure
-from jaxbiped.study.schema import FAMILIES
+from jaxbiped.statistics.schema import FAMILIES
 from tests.api.conftest import EXAMPLES
 
 

@@ -4,8 +4,8 @@ import polars as pl
 import pytest
 
 import jaxbiped as jb
-from jaxbiped.study.names import METRICS
-from jaxbiped.study.schema import SCHEMA
+from jaxbiped.core.names import METRICS
+from jaxbiped.statistics.schema import SCHEMA
 from tests.api.conftest import gives_up, plain_dijkstra
 
 

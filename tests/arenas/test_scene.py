@@ -8,7 +8,7 @@ import pytest
 
 from jaxbiped.arenas import FAMILIES, SceneConfig, load_scene, sample, scene_warnings, to_arena
 from jaxbiped.errors import InputError
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 
 FOLDER = Path(__file__).parents[2] / "configs" / "scenes"
 GOOD = """

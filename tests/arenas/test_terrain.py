@@ -15,11 +15,11 @@ from jaxbiped.geometry.height_field import HeightField
 from jaxbiped.geometry.rays import cast_boxes, key, nearness
 from jaxbiped.mapping import Cell, GridSpec, truth_grid
 from jaxbiped.mission.executors import kinematic
-from jaxbiped.mission.sampled import sampled
+from jaxbiped.mission.sampled_executor import sampled
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
+from jaxbiped.motion.config import RobotConfig
 from jaxbiped.motion.primitives import Command, Primitive
-from jaxbiped.motion.robot import RobotConfig
 from jaxbiped.sensing import measure_oracle
 from jaxbiped.sensing.camera import Mount, placed
 from tests.geometry.triangles import height_at

@@ -12,20 +12,20 @@ from skimage import data
 
 from jaxbiped.commands import compare, fit_sensor, plan, reproduce, run, scenario, sweep
 from jaxbiped.commands.plan import Plan
-from jaxbiped.mapping.moving_ai import load_map, load_scenario
+from jaxbiped.formats.moving_ai import load_map, load_scenario
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.stepped import Mission
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.mission.recorded_driver import Mission
+from jaxbiped.reproduction import EXPERIMENTS
+from jaxbiped.reproduction.findings import Findings
+from jaxbiped.reproduction.mishaps import MISHAPS, Ending
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.study.fitting import Fit
-from jaxbiped.study.reproduction import EXPERIMENTS
-from jaxbiped.study.reproduction.findings import Findings
-from jaxbiped.study.reproduction.mishaps import MISHAPS, Ending
 from jaxbiped.study.store import read_manifest
 from tests.commands.test_classify import ROOM
 from tests.commands.test_stereo import CAMERA
 from tests.report.test_pictures import mission
-from tests.report.test_reproduction_page import a_log, a_record
-from tests.study.test_sides import stored
+from tests.reproduction.test_reproduction_page import a_log, a_record
+from tests.study.test_stored_series import stored
 
 DATA = Path(__file__).parent.parent / "data"
 ROOMS, SCEN = DATA / "rooms.map", DATA / "rooms.map.scen"

@@ -7,7 +7,7 @@ import pytest
 from jaxbiped import cli
 from jaxbiped.commands.cache import amount
 from jaxbiped.core import kept_files
-from jaxbiped.core.cache_folder import VARIABLE
+from jaxbiped.core.cache_location import VARIABLE
 
 
 @pytest.fixture

@@ -14,10 +14,10 @@ from jaxbiped import cli
 from jaxbiped.commands import classify
 from jaxbiped.commands.classify import ClassifyArgs
 from jaxbiped.errors import InputError
+from jaxbiped.formats.cloud import save_ply
 from jaxbiped.mapping import class_grid
+from jaxbiped.mapping.gravity import FRAMES
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mapping.upright import FRAMES
-from jaxbiped.sensing.cloud import save_ply
 
 # What stands at a few places of `room`, metres
 PLACES = {(0.3, 0.3): Cell.FLOOR, (0.9, 0.8): Cell.BUMP, (1.5, 0.5): Cell.OBSTACLE, (1.475, 1.2): Cell.GATE}

@@ -8,11 +8,11 @@ import pytest
 
 from jaxbiped import cli, files
 from jaxbiped.commands import compare, run
+from jaxbiped.core.names import METRICS
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import PRESETS
-from jaxbiped.study.names import METRICS
-from jaxbiped.study.schema import SCHEMA
+from jaxbiped.statistics.schema import SCHEMA
 
 SCENE = "configs/scenes/experiment_5.toml"
 

@@ -11,7 +11,7 @@ from jaxbiped.commands.options.stored import StoredArgs
 from jaxbiped.commands.options.strategies import DARES
 from jaxbiped.commands.short_help import first_sentence
 from jaxbiped.config import Model
-from jaxbiped.study.names import STRATEGIES
+from jaxbiped.core.names import STRATEGIES
 
 BY_PLACE = {"scene", "file", "left", "right", "cloud", "folder", "folders", "result"}
 SCREEN, COLUMNS = 40, 80

@@ -7,11 +7,11 @@ import pytest
 from PIL import Image
 
 from jaxbiped import cli
+from jaxbiped.biped.spread import SETS
 from jaxbiped.commands import primitives
 from jaxbiped.config import load
 from jaxbiped.errors import InputError
 from jaxbiped.mission.library import DEFAULT, PLAYED, LibraryConfig, load_library
-from jaxbiped.physics.spread import SETS
 from jaxbiped.report import video
 from tests.commands.test_cli import SCENE, here, refused
 

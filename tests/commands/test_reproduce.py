@@ -5,7 +5,7 @@ import json
 import pytest
 
 from jaxbiped import cli
-from jaxbiped.study.reproduction import EXPERIMENTS
+from jaxbiped.reproduction import EXPERIMENTS
 from tests.report.html_reader import Reader
 
 SMALL = ("--repeats", "1", "--draws", "0", "--population", "0", "--walked", "0")

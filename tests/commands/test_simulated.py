@@ -9,7 +9,7 @@ import pytest
 from jaxbiped import cli
 from jaxbiped.commands import run
 from jaxbiped.mission.settings import SWAYING, MissionConfig
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 
 SCENE = """
 name = "short"

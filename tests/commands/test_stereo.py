@@ -18,11 +18,11 @@ from jaxbiped.commands.stereo import StereoArgs
 from jaxbiped.config import load_toml
 from jaxbiped.errors import InputError
 from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.chart import ONE_LOOK, lay_out, make_chart
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.motion.robot import RobotConfig
-from jaxbiped.sensing.stereo import Disparity, to_points
-from jaxbiped.sensing.stereo.calibration_files import load_rig
+from jaxbiped.mapping.scan_map import ONE_LOOK, lay_out, make_chart
+from jaxbiped.motion.config import RobotConfig
+from jaxbiped.stereo import Disparity, to_points
+from jaxbiped.stereo.calibration_files import load_rig
 
 CAMERA = Path(__file__).parents[2] / "configs" / "cameras" / "motorcycle.toml"
 

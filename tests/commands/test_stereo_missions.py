@@ -7,9 +7,9 @@ from PIL import Image
 
 from jaxbiped import cli
 from jaxbiped.config import load
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import SensorConfig
-from jaxbiped.sensing.stereo import renderer
+from jaxbiped.stereo import renderer
 from jaxbiped.study.fitting import choices
 
 SCENE = """

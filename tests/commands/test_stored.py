@@ -7,7 +7,7 @@ import pytest
 from jaxbiped import cli
 from tests.commands.test_cli import refused
 from tests.report.html_reader import Reader
-from tests.study.test_sides import stored
+from tests.study.test_stored_series import stored
 
 FEW = ("--resamples", "50")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from jaxbiped import __version__, cli
-from tests.study.test_sides import stored
+from tests.study.test_stored_series import stored
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = f"{sys.executable} -m tests.commands.pretended"

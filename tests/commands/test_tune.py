@@ -13,10 +13,10 @@ import pytest
 from jaxbiped import cli, files
 from jaxbiped.config import load
 from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.statistics.schema import FAMILIES
 from jaxbiped.study import trials
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import evaluate
-from jaxbiped.study.schema import FAMILIES
+from jaxbiped.study.evaluation import evaluate
 from jaxbiped.study.trials import Trials
 
 PAPER = np.array([1.0, 1.0, 5.0, 10.0, 100.0])

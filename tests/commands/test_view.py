@@ -11,8 +11,8 @@ import pytest
 from jaxbiped import cli
 from jaxbiped.commands import view
 from jaxbiped.mission.recording import save_log
-from tests.report.test_viewer import seen
-from tests.study.test_sides import stored
+from tests.study.test_stored_series import stored
+from tests.viewer.test_viewer import seen
 
 pytest.importorskip("viser")
 ONCE = ("--once", "--port", "0")

@@ -13,7 +13,7 @@ import pytest
 
 from jaxbiped import jax_settings
 from jaxbiped.core import kept_files, program_cache
-from jaxbiped.core.cache_folder import VARIABLE
+from jaxbiped.core.cache_location import VARIABLE
 
 ROOT = Path(__file__).parents[2]
 HIT, MISS = "/jax/compilation_cache/cache_hits", "/jax/compilation_cache/cache_misses"

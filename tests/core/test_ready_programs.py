@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxbiped.core import program_key, ready_programs
-from jaxbiped.core.lazy_package import REPLACED
-from jaxbiped.core.program_key import NotOurs, described
+from jaxbiped.core import program_identity, ready_programs
+from jaxbiped.core.lazy_loading import REPLACED
+from jaxbiped.core.program_identity import NotOurs, described
 from jaxbiped.core.ready_programs import program_file, ready_jit
 from jaxbiped.mission.outcome import Code
 from jaxbiped.planning.costs import Costs
@@ -197,42 +197,42 @@ def test_nothing_is_kept_once_the_package_was_changed(tmp_path, monkeypatch):
     monkeypatch.setenv("JAXBIPED_CACHE", str(tmp_path))
     REPLACED.clear()
     before = program_file("name", (np.zeros(3),), 1)
-    monkeypatch.setattr(program_key, "package_hash", lambda: "other")
-    program_key.of_this_machine.cache_clear()
-    assert before and "jaxbiped.core.program_key.package_hash" in REPLACED
+    monkeypatch.setattr(program_identity, "package_hash", lambda: "other")
+    program_identity.of_this_machine.cache_clear()
+    assert before and "jaxbiped.core.program_identity.package_hash" in REPLACED
     assert program_file("name", (np.zeros(3),), 1) is None
     REPLACED.clear()
     assert program_file("name", (np.zeros(3),), 1) not in (None, before)
     monkeypatch.undo()
-    program_key.of_this_machine.cache_clear()
+    program_identity.of_this_machine.cache_clear()
     REPLACED.clear()
 
 
 def test_replacing_anything_in_a_module_is_seen():
     code = """
 import jaxbiped as jb
-from jaxbiped.core.lazy_package import REPLACED
-from jaxbiped.mission import queue
-import jaxbiped.planning.field, jaxbiped.study.evaluate, jaxbiped.arenas.families, jaxbiped.formats.elevation
+from jaxbiped.core.lazy_loading import REPLACED
+from jaxbiped.mission import batched_driver
+import jaxbiped.planning.cost_field, jaxbiped.study.evaluation, jaxbiped.arenas.families, jaxbiped.formats.elevation
 jb.play, jb.Study, jb.planning.field, jb.mapping.update
 print(sorted(REPLACED))
-queue.TURNS = 4
+batched_driver.TURNS = 4
 jaxbiped.arenas.families.MAX_BOXES = 3
 print(sorted(REPLACED))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n['jaxbiped.arenas.families.MAX_BOXES', 'jaxbiped.mission.queue.TURNS']\n"
+    assert done.stdout == "[]\n['jaxbiped.arenas.families.MAX_BOXES', 'jaxbiped.mission.batched_driver.TURNS']\n"
 
 
 PATCHED = """
 import jaxbiped as jb
-import jaxbiped.study.evaluate, jaxbiped.api.results, jaxbiped.report.page, jaxbiped.mission.walking
-from jaxbiped.core import program_key
-print(program_key.has_foreign_methods(), sorted(program_key.REPLACED))
+import jaxbiped.study.evaluation, jaxbiped.api.results, jaxbiped.report.page, jaxbiped.mission.simulated_driver
+from jaxbiped.core import program_identity
+print(program_identity.has_foreign_methods(), sorted(program_identity.REPLACED))
 def blind(self, *_):
     raise AssertionError
 jb.Oracle.measure = blind
-print(program_key.has_foreign_methods(), sorted(program_key.REPLACED))
+print(program_identity.has_foreign_methods(), sorted(program_identity.REPLACED))
 """
 
 
@@ -242,24 +242,24 @@ def test_replacing_a_method_of_a_class_is_seen(tmp_path):
 
 
 def test_files_that_were_edited_since_they_were_read_are_not_trusted(tmp_path, monkeypatch):
-    program_key.package_hash.cache_clear()
+    program_identity.package_hash.cache_clear()
     here = tmp_path / "package"
     here.mkdir()
     (here / "module.py").write_text("a = 1\n")
-    monkeypatch.setattr(program_key, "PACKAGE", here)
+    monkeypatch.setattr(program_identity, "PACKAGE", here)
     with pytest.raises(OSError):  # it is newer than this process
-        program_key.package_hash()
-    monkeypatch.setattr(program_key, "IMPORTED", time.time() + 5)
-    first = program_key.package_hash()
+        program_identity.package_hash()
+    monkeypatch.setattr(program_identity, "IMPORTED", time.time() + 5)
+    first = program_identity.package_hash()
     (here / "module.py").write_text("a = 2\n")
-    program_key.package_hash.cache_clear()
-    assert program_key.package_hash() != first
+    program_identity.package_hash.cache_clear()
+    assert program_identity.package_hash() != first
     (here / "module.py").rename(here / "module.txt")
-    program_key.package_hash.cache_clear()
+    program_identity.package_hash.cache_clear()
     with pytest.raises(OSError):  # there is no text
-        program_key.package_hash()
+        program_identity.package_hash()
     monkeypatch.undo()
-    program_key.package_hash.cache_clear()
+    program_identity.package_hash.cache_clear()
     REPLACED.clear()
 
 

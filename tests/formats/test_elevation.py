@@ -10,7 +10,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.formats import Elevation, load_elevation, save_elevation
 from jaxbiped.mapping.grid import MOST_CELLS
 from tests.nasty_files import read_or_refuse, same, spoilt
-from tests.sensing.stereo.test_images import png, tiff
+from tests.stereo.test_images import png, tiff
 
 HEIGHTS = np.round(np.random.default_rng(0).uniform(-0.2, 1.0, (5, 7)), 3)
 GREY = np.random.default_rng(1).integers(0, 256, (5, 7)).astype(np.uint8)

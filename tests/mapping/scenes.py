@@ -6,8 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mapping.grid import Body, GridSpec
-from jaxbiped.mapping.params import MapConfig
 from jaxbiped.sensing.view import View
 
 SPEC = GridSpec()

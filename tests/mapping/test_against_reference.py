@@ -14,8 +14,8 @@ from jaxbiped.arenas.arena import Arena, Landmarks
 from jaxbiped.geometry.boxes import Boxes
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import cobstacles, gridmap, leveling, truth
+from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mapping.grid import Body, GridSpec
-from jaxbiped.mapping.params import MapConfig
 from jaxbiped.mapping.relief import Surfaces
 from jaxbiped.sensing.view import View
 from tests.reference import mapping as reference

@@ -4,8 +4,8 @@ import pytest
 
 from jaxbiped.config import parse
 from jaxbiped.errors import InputError
+from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mapping.grid import GridSpec
-from jaxbiped.mapping.params import MapConfig
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import gridmap
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
-from jaxbiped.sensing import noise, raycast
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing import presets, raycast
+from jaxbiped.sensing.config import CameraConfig, NoiseConfig
 from tests.mapping.scenes import BODY, PARAMS
 
 SPEC, CAMERA = GridSpec(), CameraConfig()
@@ -131,7 +131,7 @@ BOUNDS = {
     (random_poses, "real"): {"right": 0.962, "within one cell": 0.988, "BUMP within one cell": (0.98, 0.98)},
     (random_poses, "ideal"): {"right": 0.975, "within one cell": 0.994},
 }
-PRESETS = {"ideal": noise.IDEAL, "rendered": noise.RENDERED, "real": noise.REAL}
+PRESETS = {name: preset.stereo for name, preset in presets.PRESETS.items()}
 
 
 @pytest.mark.parametrize(("choose", "preset"), BOUNDS, ids=[f"{c.__name__}, {p}" for c, p in BOUNDS])
@@ -142,5 +142,5 @@ def test_quality(choose, preset):
 
 
 def test_tilt_of_a_degree_costs_little():
-    tilted = figures(*mapped(random_poses, noise.NoiseConfig(attitude_sd=1.0)))
+    tilted = figures(*mapped(random_poses, NoiseConfig(attitude_sd=1.0)))
     assert tilted["right"] >= 0.965 and min(tilted["BUMP within one cell"]) >= 0.97

@@ -9,7 +9,7 @@ import pytest
 
 from jaxbiped.geometry.height_field import HeightField
 from jaxbiped.mapping import Cell, GridSpec, terrain_grid
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import RobotConfig
 from tests.geometry.triangles import height_at
 from tests.reference import mapping as reference
 

@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.core.names import STRATEGIES
+from jaxbiped.mission.batched_driver import Jobs, compile_queue, stack
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import Jobs, compile_queue, stack
+from jaxbiped.mission.recorded_driver import turn_once
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.state import World, start
-from jaxbiped.mission.stepped import turn_once
+from jaxbiped.mission.state import WorldState, start
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
-from jaxbiped.study.evaluate import draw
-from jaxbiped.study.names import STRATEGIES
+from jaxbiped.study.evaluation import draw
 from tests.mission.replay import Moment
 
 ARENAS, SETTINGS, JOBS, SLOTS = 32, 16, 32, 8
@@ -63,11 +63,11 @@ class Log:
     votes: np.ndarray  # [T, H, W, 4]
     command: Command  # leaves [T]
     moments: tuple[Moment, ...]  # [T]
-    world: World  # at the end
+    world: WorldState  # at the end
 
 
 def step_through(arena, setting, seed, program=PROGRAM) -> Log:
-    """One mission by a Python loop over `cycle`, alone in its batch, as the package's stepped driver has it."""
+    """One mission by a Python loop over `step`, alone in its batch, as the package's recorded driver has it."""
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (arena, setting))
     world, mind = compiled_start(*batch, jnp.asarray([seed]), program.spec)
     taken, moments = [], []
@@ -104,5 +104,5 @@ def played(population):
 
 @pytest.fixture(scope="session")
 def stepped(population):
-    """The population's missions by the stepped driver: a log each."""
+    """The population's missions by the recorded driver: a log each."""
     return [step_through(*each) for each in zip(*population[:3], strict=True)]

@@ -17,9 +17,9 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.mapping.gridmap import GridMap
 from jaxbiped.mapping.relief import FACE, Surfaces
-from jaxbiped.mission.cycle import SENSE
-from jaxbiped.mission.state import World
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.mission.mission_step import SENSE
+from jaxbiped.mission.state import WorldState
+from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.view import View
 from tests.reference import mapping, sensing
 
@@ -41,7 +41,7 @@ MOST_WAYS = 4096  # that are tried for the points on borders of one view
 class Moment:
     """One decision of the compiled loop: what it started from, and what came of it."""
 
-    world: World  # before
+    world: WorldState  # before
     look: np.ndarray  # [] whether it looked down
     view: View  # as measured
     pose: Pose  # as then believed

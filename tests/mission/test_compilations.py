@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from jaxbiped import planning
+from jaxbiped.mission.batched_driver import COMPILED, SLOTS, stack
 from jaxbiped.mission.oracle import oracle_plan
-from jaxbiped.mission.queue import COMPILED, SLOTS, stack
-from jaxbiped.mission.stepped import run_bare
+from jaxbiped.mission.recorded_driver import run_bare
 from tests.mission.conftest import PROGRAM, SETTINGS, pad, play
 
 EVENTS = []

@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import stack
-from jaxbiped.mission.stepped import run_logged
+from jaxbiped.mission.recorded_driver import run_logged
 from jaxbiped.study.queues import run_all
 from tests.mission.conftest import PROGRAM, pad, play, row
 

@@ -11,9 +11,9 @@ import pytest
 
 from jaxbiped.arenas.scene import load_scene
 from jaxbiped.errors import InputError
-from jaxbiped.mission.cycle import cycle, sense
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.eyes import eyes_for, where
-from jaxbiped.mission.queue import stack
+from jaxbiped.mission.mission_step import sense, step
 from jaxbiped.mission.sensors import RayCast
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import start
@@ -71,7 +71,7 @@ def test_eyes_that_cannot_be_opened_end_all_missions(first_look):
 def test_loop_does_not_stand_in_for_a_sensor_on_the_host(first_look):
     static = replace(PROGRAM, sensor="stereo")
     with pytest.raises(ValueError, match="given what they see"):
-        jax.eval_shape(partial(cycle, program=static), *first_look)
+        jax.eval_shape(partial(step, program=static), *first_look)
 
 
 def test_rendered_stereo_has_a_rule_for_far_walls_of_its_own():

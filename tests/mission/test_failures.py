@@ -10,13 +10,13 @@ import pytest
 from jaxbiped.arenas.scene import SceneConfig, to_arena
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.cycle import conclude
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.executors import kinematic
+from jaxbiped.mission.mission_step import apply_outcome
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import stack
-from jaxbiped.mission.state import Planned, World, start
+from jaxbiped.mission.state import Planned, WorldState, start
 from jaxbiped.motion.primitives import Command, Primitive
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from tests.mission.conftest import CONFIG, PROGRAM, play, row
 from tests.reference import motion as plain
 
@@ -82,9 +82,9 @@ def test_out_of_bounds():
     )
     done = kinematic(arena, world, step, setting)
     assert bool(done.outside)
-    after, _ = conclude(world, mind, step, jnp.int32(Code.RUNNING), done, arena, setting, PROGRAM)
+    after, _ = apply_outcome(world, mind, step, jnp.int32(Code.RUNNING), done, arena, setting, PROGRAM)
     assert after.code == Code.OUT_OF_BOUNDS
-    stopped, _ = conclude(world, mind, step, jnp.int32(Code.NO_PATH), done, arena, setting, PROGRAM)
+    stopped, _ = apply_outcome(world, mind, step, jnp.int32(Code.NO_PATH), done, arena, setting, PROGRAM)
     assert stopped.code == Code.NO_PATH and stopped.pose.x == world.pose.x and stopped.distance == 0
 
 
@@ -118,7 +118,7 @@ def test_referee_is_that_of_the_reference(population):
     zero = jnp.zeros(PLACES)
     none = jnp.zeros(PLACES, jnp.int32)
     seed = jnp.asarray(rng.integers(0, 2**32, PLACES, dtype=np.uint32))
-    world = World(
+    world = WorldState(
         Pose(x, y, z, yaw),
         jnp.asarray(squat),
         zero,

@@ -9,10 +9,10 @@ from jaxbiped.arenas.scene import BoxConfig, LandmarkConfig, SceneConfig, to_are
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.goal import MARGIN, goal_cell
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.recorded_driver import run_logged
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.stepped import run_logged
 from jaxbiped.planning import Rules
-from jaxbiped.sensing.hashing import from_key
+from jaxbiped.sensing.counter_rng import from_key
 
 SPEC = GridSpec()
 MARKS = tuple(LandmarkConfig(kind="circle", at=at) for at in ((0.6, 0.2), (0.6, 1.2), (1.7, 0.4), (1.7, 1.0)))

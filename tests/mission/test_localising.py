@@ -10,15 +10,16 @@ import pytest
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation import predict
+from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.eyes import eyes_for, view_names
 from jaxbiped.mission.localising import carried_on, localise, unmarked
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.queue import stack
+from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
-from jaxbiped.mission.stepped import run_bare
-from jaxbiped.sensing import Motion, Sightings, View, predict
-from jaxbiped.sensing.hashing import from_key
+from jaxbiped.sensing import Motion, Sightings, View
+from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.study.queues import run_all
 
 AREA = (1.8, 1.4)

@@ -5,7 +5,7 @@ import json
 import numpy as np
 
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.stepped import Mission
+from jaxbiped.mission.recorded_driver import Mission
 
 
 def test_a_code_prints_as_its_label_and_counts_as_a_number():

@@ -15,15 +15,15 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES
 from jaxbiped.mapping import Cell, truth_grid
 from jaxbiped.mission.decision import nearest_direction
-from jaxbiped.mission.following import follow
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.plan_rollout import follow
+from jaxbiped.mission.recorded_driver import run_logged
 from jaxbiped.mission.route import pose_problem, times_of
 from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.stepped import run_logged
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
-from jaxbiped.study.evaluate import draw
+from jaxbiped.study.evaluation import draw
 from tests.mission.conftest import CONFIG, PROGRAM
 
 B = 24  # maps

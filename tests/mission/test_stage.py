@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from jaxbiped.biped import request as ask
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes
-from jaxbiped.mission.footwork import WalkConfig, targets
+from jaxbiped.mission.primitive_schedule import WalkConfig, targets
 from jaxbiped.mission.stage import Stage, nearest
-from jaxbiped.motion import request as ask
 
 ROBOT = WalkConfig().biped
 AHEAD = targets(ask.straight(0.05).lasting(2.5), ROBOT)

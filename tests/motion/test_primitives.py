@@ -6,8 +6,8 @@ import numpy as np
 import pydantic
 import pytest
 
-from jaxbiped.motion.primitives import Command, DurationConfig, Primitive, duration
-from jaxbiped.motion.robot import RobotConfig
+from jaxbiped.motion.config import DurationConfig, RobotConfig
+from jaxbiped.motion.primitives import Command, Primitive, duration
 
 TABLE_2 = {  # command: (turn [deg], primitive, length [m], rise), seconds
     "straight": ((0, Primitive.STRAIGHT_FORWARD, 0.05, 0), 16),

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from jaxbiped import planning
-from jaxbiped.planning.compiled import LANES
+from jaxbiped.planning.kernels import LANES
 from jaxbiped.planning.path import TIE
 from tests.planning import adversarial, oracle
 

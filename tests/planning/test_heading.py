@@ -11,7 +11,7 @@ from jaxbiped import planning
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import Times
-from jaxbiped.planning.heading.crossing import crossing_faces, dense_faces
+from jaxbiped.planning.heading.edge_direction import crossing_faces, dense_faces
 from tests.planning import heading_oracle, oracle
 
 H, W, B = 9, 11, 12

@@ -10,52 +10,52 @@ import numpy as np
 import pytest
 from numba import njit
 
-from jaxbiped.core.cache_folder import VARIABLE, cache_folder
-from jaxbiped.planning.compiled import foreign, objects
+from jaxbiped.core.cache_location import VARIABLE, cache_folder
+from jaxbiped.planning.kernels import objects, xla_ffi
 
 NAME = "jaxbiped_test_doubled"
 
 
 @njit
 def doubled(arguments, count, results):
-    size = foreign.shape(arguments, 0)[0]
-    given = foreign.array(arguments, 0, size, np.float64)
+    size = xla_ffi.shape(arguments, 0)[0]
+    given = xla_ffi.array(arguments, 0, size, np.float64)
     room = np.zeros(size)  # of Numba's own runtime
     for i in range(size):
         room[i] = 2 * given[i] + count
-    foreign.array(results, 0, size, np.float64)[:] = room
+    xla_ffi.array(results, 0, size, np.float64)[:] = room
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
     yield tmp_path / "cache" / "kernels" / objects.key()
-    for known in (foreign.HANDLERS, foreign.ADDRESSES):
+    for known in (xla_ffi.HANDLERS, xla_ffi.ADDRESSES):
         known.pop(NAME, None)
 
 
 def answer():
     given, made = np.arange(5.0), np.zeros(5)
-    foreign.call(NAME, (given,), (made,))
+    xla_ffi.call(NAME, (given,), (made,))
     return made.tolist()
 
 
 def test_what_is_kept_is_the_same_function(folder):
-    foreign.compile_handler(NAME, doubled, keep=True)
+    xla_ffi.compile_handler(NAME, doubled, keep=True)
     compiled = answer()
     assert compiled == [1, 3, 5, 7, 9] and [file.name for file in folder.iterdir()] == [NAME]
     address = objects.load(NAME)
-    assert address and address != foreign.ADDRESSES[NAME]
-    foreign.ADDRESSES[NAME] = address
+    assert address and address != xla_ffi.ADDRESSES[NAME]
+    xla_ffi.ADDRESSES[NAME] = address
     assert answer() == compiled
-    del foreign.HANDLERS[NAME]
-    foreign.compile_handler(NAME, None, keep=True)  # nothing is left to compile
-    assert answer() == compiled and NAME not in foreign.HANDLERS
+    del xla_ffi.HANDLERS[NAME]
+    xla_ffi.compile_handler(NAME, None, keep=True)  # nothing is left to compile
+    assert answer() == compiled and NAME not in xla_ffi.HANDLERS
 
 
 def test_a_damaged_file_is_none(folder):
     assert objects.load(NAME) is None
-    foreign.compile_handler(NAME, doubled, keep=True)
+    xla_ffi.compile_handler(NAME, doubled, keep=True)
     whole = (folder / NAME).read_bytes()
     other = bytes([whole[-1] ^ 1])
     wrong = [whole[:n] for n in (0, 1, 17, 18, 49, 50, 51, 200, len(whole) // 2, len(whole) - 1)]
@@ -69,7 +69,7 @@ def test_a_damaged_file_is_none(folder):
     for data in wrong:
         (folder / NAME).write_bytes(data)
         assert objects.load(NAME) is None
-    foreign.compile_handler(NAME, doubled, keep=True)
+    xla_ffi.compile_handler(NAME, doubled, keep=True)
     assert (
         answer() == [1, 3, 5, 7, 9]
         and (folder / NAME).read_bytes()[:50] == whole[:18] + (folder / NAME).read_bytes()[18:50]
@@ -84,12 +84,12 @@ def test_without_a_folder_it_works_all_the_same(folder, tmp_path, monkeypatch):
     for value in ("off", "OFF"):
         monkeypatch.setenv(VARIABLE, value)
         assert cache_folder() is None
-    foreign.compile_handler(NAME, doubled, keep=True)
+    xla_ffi.compile_handler(NAME, doubled, keep=True)
     assert answer() == [1, 3, 5, 7, 9] and list(tmp_path.iterdir()) == []
     (tmp_path / "file").write_text("no folder")
     for wrong in (tmp_path / "file", tmp_path / "file" / "below", "/proc/none", "~nobody_of_this_name/x"):
         monkeypatch.setenv(VARIABLE, str(wrong))
-        foreign.compile_handler(NAME, doubled, keep=True)
+        xla_ffi.compile_handler(NAME, doubled, keep=True)
         assert answer() == [1, 3, 5, 7, 9] and objects.load(NAME) is None
 
 
@@ -109,7 +109,7 @@ def test_only_the_last_versions_stay(folder):
         old.mkdir(parents=True)
         (old / "kernel").write_text("x")
         os.utime(old, (1000 + k, 1000 + k))
-    foreign.compile_handler(NAME, doubled, keep=True)
+    xla_ffi.compile_handler(NAME, doubled, keep=True)
     left = {f.name for f in folder.parent.iterdir()}
     assert (
         len(left) == objects.OLDEST
@@ -120,8 +120,8 @@ def test_only_the_last_versions_stay(folder):
 
 
 def test_many_at_once(folder):
-    foreign.compile_handler(NAME, doubled, keep=True)
-    handler = foreign.HANDLERS[NAME]
+    xla_ffi.compile_handler(NAME, doubled, keep=True)
+    handler = xla_ffi.HANDLERS[NAME]
     with ThreadPoolExecutor(8) as pool:
         list(pool.map(lambda _: objects.store(NAME, handler), range(40)))
     assert [file.name for file in folder.iterdir()] == [NAME] and objects.load(NAME)
@@ -132,7 +132,7 @@ import sys
 import jax
 import numpy as np
 from jaxbiped import planning
-from jaxbiped.planning.compiled import foreign
+from jaxbiped.planning.kernels import xla_ffi
 
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 missed = []
@@ -149,7 +149,7 @@ for method in sys.argv[1:]:
     headings = planning.heading_field(classes, levels, goal_ij=[[7, 3]], method=method)
     print(bool(headings.converged.all()), np.asarray(headings.cost).tobytes().hex())
 print(many.cost[39].tobytes().hex())
-print("compiled", len(foreign.HANDLERS), "of", len(foreign.ADDRESSES), "and", len(missed))
+print("compiled", len(xla_ffi.HANDLERS), "of", len(xla_ffi.ADDRESSES), "and", len(missed))
 """
 
 
@@ -167,17 +167,17 @@ import sys
 import jax, jax.numpy as jnp, numpy as np
 from numba import njit
 from jaxbiped.jax_settings import own_settings
-from jaxbiped.planning.compiled import foreign
+from jaxbiped.planning.kernels import xla_ffi
 
 factor = int(sys.argv[1])
 
 @njit
 def scaled(arguments, count, results):
-    size = foreign.shape(arguments, 0)[0]
-    given = foreign.array(arguments, 0, size, np.float32)
-    foreign.array(results, 0, size, np.float32)[:] = factor * given
+    size = xla_ffi.shape(arguments, 0)[0]
+    given = xla_ffi.array(arguments, 0, size, np.float32)
+    xla_ffi.array(results, 0, size, np.float32)[:] = factor * given
 
-foreign.register("jaxbiped_test_scaled", scaled)
+xla_ffi.register("jaxbiped_test_scaled", scaled)
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 hits = []
 jax.monitoring.register_event_duration_secs_listener(

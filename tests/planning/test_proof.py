@@ -8,8 +8,8 @@ from numba import njit
 
 from jaxbiped import planning
 from jaxbiped.planning import wavefront
-from jaxbiped.planning.compiled import LANES, foreign, grids, heading, heading_sweep, line_sweep, solvers
 from jaxbiped.planning.costs import Costs, Rules, tables
+from jaxbiped.planning.kernels import LANES, grids, heading, heading_sweep, line_sweep, solvers, xla_ffi
 
 H, W = 5, 7
 CLASSES = np.ones((LANES, H, W), np.int8)
@@ -31,7 +31,7 @@ def test_a_kernel_of_grids_that_stops_early_does_not_converge():
     for sweeps, expected in ((lambda lanes: give_up, early), (line_sweep.sweeps, whole)):
         size = grids.room_size(H, W)
         steps, settled = np.zeros(LANES, np.int32), np.zeros(LANES, bool)
-        grids.settler(sweeps)(
+        grids.make_solver(sweeps)(
             CLASSES.ravel(), 0 * CLASSES.ravel(), *(table.ravel() for table in read), GOALS,
             np.zeros(CLASSES.size, np.float32), steps, settled,
             np.zeros(size), np.zeros(4 * size, np.float32), np.zeros(3 * size, np.int8), H, W,
@@ -43,7 +43,7 @@ def test_a_kernel_of_grids_that_stops_early_does_not_converge():
 def test_a_kernel_of_edges_that_stops_early_does_not_converge(lanes, monkeypatch):
     """`lanes`: of Dijkstra's method, and of line sweeps."""
     name = f"test_give_up_{lanes}"
-    foreign.register(name, solvers.solver(give_up, lanes))
+    xla_ffi.register(name, solvers.solver(give_up, lanes))
     monkeypatch.setattr(solvers, "registered", lambda kernel: (name, lanes))
     edges = planning.edge_costs(CLASSES, 0 * CLASSES)
     jax.clear_caches()
@@ -67,7 +67,7 @@ def test_headings_swept_too_few_times_do_not_converge():
     time, face = (np.array(a)[:lanes].ravel() for a in (moves.time, moves.face))
     turn, field, settled = np.full(lanes, 5, np.float32), np.zeros(time.size, np.float32), np.zeros(lanes, bool)
     for rounds, expected in ((1, [True] + [False] * (lanes - 1)), (0, [True] * lanes)):
-        heading_sweep.settler(rounds)(time, face, turn, GOALS[:lanes], field, settled, 0, H, W)
+        heading_sweep.make_solver(rounds)(time, face, turn, GOALS[:lanes], field, settled, 0, H, W)
         assert settled.tolist() == expected
 
 
@@ -76,7 +76,7 @@ def test_headings_whose_times_are_too_long_are_not_settled():
     moves = planning.heading_moves(CLASSES[:1], 0 * CLASSES[:1], planning.Times(), planning.Rules())
     time, face = (np.array(a).ravel() for a in (moves.time, moves.face))
     cost = np.zeros(time.size)
-    assert heading.settle(time, face, 5.0, 2, 3, H, W, cost)
+    assert heading.solve_arena(time, face, 5.0, 2, 3, H, W, cost)
     assert heading.is_settled(time, face, 5.0, H, W, cost)
     cost[np.argmax(cost)] += 1e-3
     assert not heading.is_settled(time, face, 5.0, H, W, cost)

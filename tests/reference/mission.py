@@ -14,16 +14,16 @@ from types import SimpleNamespace
 import numpy as np
 
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation import Belief
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mission.cycle import SENSE
 from jaxbiped.mission.decision import LOOK_AROUND
 from jaxbiped.mission.goal import MARGIN
+from jaxbiped.mission.mission_step import SENSE
 from jaxbiped.mission.outcome import Code
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.motion.selection import stride
 from jaxbiped.planning import DIRECTIONS
-from jaxbiped.sensing import Belief
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from tests.reference import mapping, motion, planning, sensing
 
 f32 = np.float32

@@ -10,10 +10,11 @@ import numpy as np
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.executors import CHECKS, ODOMETRY, TOUCH
 from jaxbiped.motion.edge import WINDOW
-from jaxbiped.motion.primitives import CELL, EIGHTH, Primitive
+from jaxbiped.motion.grid_units import CELL, EIGHTH
+from jaxbiped.motion.primitives import Primitive
 from jaxbiped.motion.selection import SHORTEST, TURN_DEADBAND
 from jaxbiped.planning import DIRECTIONS
-from jaxbiped.sensing.hashing import fold
+from jaxbiped.sensing.counter_rng import fold
 from tests.reference import sensing
 
 

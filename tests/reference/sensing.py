@@ -11,9 +11,10 @@ import numpy as np
 
 from jaxbiped.arenas.arena import SQUARE
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.sensing import Belief, Sightings, View, hashing
+from jaxbiped.localisation import Belief
+from jaxbiped.localisation.kalman_filter import GATE, LEAST_VARIANCE, ROUNDS
+from jaxbiped.sensing import Sightings, View, counter_rng
 from jaxbiped.sensing.landmarks import LANDMARK
-from jaxbiped.sensing.localisation import GATE, LEAST_VARIANCE, ROUNDS
 from jaxbiped.sensing.noise import ATTITUDE, HIDING_REACH, MATCH, PHANTOM, PHANTOM_BLOCK
 from jaxbiped.sensing.odometry import ODOMETRY
 
@@ -77,7 +78,7 @@ def cast(arena, origin, basis, x, y):
 
 def measure_raycast(arena, pose, camera, noise, image, seed, look=False, squat=False):
     """The points of one view: the same slots as the package's."""
-    roll, pitch = hashing.normal(seed, np.arange(2), ATTITUDE) * noise.attitude_sd
+    roll, pitch = counter_rng.normal(seed, np.arange(2), ATTITUDE) * noise.attitude_sd
     origin, basis = camera_pose(pose, camera, look, squat, roll, pitch)
     across, down = image.stride
     u = np.concatenate([image.u[:1] - f32(across), image.u, image.u[-1:] + f32(across)])
@@ -125,8 +126,8 @@ def match(disparity, contrast, camera, image, noise, seed):
         hidden[:, i] = (at[:, i + 1 : i + 1 + reach] <= at[:, i : i + 1]).any(axis=1)
     near = d > camera.max_disparity
 
-    seed_of_match = hashing.fold(seed, MATCH)
-    chance = hashing.bits(seed_of_match, np.arange(d.size, dtype=np.uint32).reshape(shape))
+    seed_of_match = counter_rng.fold(seed, MATCH)
+    chance = counter_rng.bits(seed_of_match, np.arange(d.size, dtype=np.uint32).reshape(shape))
     first, second = (chance & np.uint32(0xFFFF)) / 65536, (chance >> np.uint32(16)) / 65536
     lost = np.full(shape, noise.drop_plain)
     lost[edge] = noise.drop_edge
@@ -146,14 +147,14 @@ def match(disparity, contrast, camera, image, noise, seed):
 
     r = max(float(noise.correlation), 1e-6)
     c = f32((1 - np.sqrt(max(1 - 4 * r * r, 0))) / (2 * r))
-    white = hashing.normal(seed_of_match, np.arange((shape[0] + 1) * (shape[1] + 1), dtype=np.uint32), 1)
+    white = counter_rng.normal(seed_of_match, np.arange((shape[0] + 1) * (shape[1] + 1), dtype=np.uint32), 1)
     white = white.reshape(shape[0] + 1, shape[1] + 1)
     white = white[:, :-1] + c * white[:, 1:]
     white = (white[:-1] + c * white[1:]) / (1 + c * c)
     measured = d + np.where(swapped, other, 0) + noise.bias + noise.sd * (1 + noise.slope_gain * across) * white
 
     block = (image.v // PHANTOM_BLOCK)[:, None] * (image.width // PHANTOM_BLOCK + 1) + image.u // PHANTOM_BLOCK
-    clump = hashing.bits(hashing.fold(seed, PHANTOM), block.astype(np.uint32))
+    clump = counter_rng.bits(counter_rng.fold(seed, PHANTOM), block.astype(np.uint32))
     wild = 1 + (clump & np.uint32(0xFFFF)) / 65536 * (camera.max_disparity - 1)
     share = np.where(near, noise.phantom_near, np.where(hidden, noise.phantom_hidden, 0))
     phantom = (clump >> np.uint32(16)) / 65536 < share
@@ -169,7 +170,7 @@ def sight_landmarks(arena, pose, camera, noise, image, seed, look=False, squat=F
     """Which landmarks are seen, and where."""
     marks = arena.landmarks
     origin, basis = camera_pose(pose, camera, look, squat)
-    error = hashing.normal(seed, np.arange(2 * len(marks.x)), LANDMARK).reshape(2, -1)
+    error = counter_rng.normal(seed, np.arange(2 * len(marks.x)), LANDMARK).reshape(2, -1)
     result = np.zeros((3, len(marks.x)), f32)
     seen = np.zeros(len(marks.x), bool)
     for k in np.flatnonzero(marks.used):
@@ -245,7 +246,7 @@ def drift(displacement, noise, seed):
     walked, turned = np.hypot(displacement[0], displacement[1]), abs(displacement[2])
     yaw = noise.yaw_walked**2 * walked + noise.yaw_turned**2 * turned
     variances = np.array([noise.forward**2 * walked, noise.lateral**2 * walked, yaw], f32)
-    error = np.sqrt(variances) * hashing.normal(seed, np.arange(3), ODOMETRY)
+    error = np.sqrt(variances) * counter_rng.normal(seed, np.arange(3), ODOMETRY)
     return tuple(part + e for part, e in zip(displacement, error, strict=True)), variances
 
 

@@ -8,14 +8,14 @@ import pytest
 
 from jaxbiped.errors import InputError
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.stepped import Mission
+from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.report import examples as room
 from jaxbiped.report.examples import KEY, example_section
-from jaxbiped.study.again import Origin
+from jaxbiped.study.replay import Origin
 from tests.report.html_reader import Reader
 from tests.report.test_pictures import mission
 from tests.study.synthetic import rows
-from tests.study.test_sides import open_stored, stored
+from tests.study.test_stored_series import open_stored, stored
 
 PAIR = ("full", "floor_only")
 FRAME = rows(60, strategies=PAIR)

@@ -11,7 +11,7 @@ from PIL import Image
 from jaxbiped import files
 from jaxbiped.errors import InputError
 from jaxbiped.report import figures
-from jaxbiped.study import STRATEGIES, compare
+from jaxbiped.statistics import compare
 from tests.study.synthetic import rows
 
 FRAME = rows(60)

@@ -11,11 +11,11 @@ import pytest
 
 from jaxbiped.report.folder_report import write_report
 from jaxbiped.report.grid import parsed, to_grid, typeset
-from jaxbiped.report.plots import attributed, attribution_sheet
+from jaxbiped.report.page_figures import attributed, attribution_sheet
 from jaxbiped.report.tables import Sheet
 from jaxbiped.study import create
 from tests.report.html_reader import Reader
-from tests.report.test_summary import Config
+from tests.report.test_comparison_report import Config
 from tests.study.synthetic import rows
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome", "chrome"))), None)

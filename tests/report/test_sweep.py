@@ -14,8 +14,8 @@ from jaxbiped.errors import InputError
 from jaxbiped.report.sweep import write_sweep_report
 from jaxbiped.report.sweep_figures import sweep_figure
 from jaxbiped.study import read_points, store
-from jaxbiped.study.conduct import conduct, table
-from jaxbiped.study.groups import group_points, only_point, shards
+from jaxbiped.study.batching import group_points, only_point, shards
+from jaxbiped.study.run_study import conduct, table
 from jaxbiped.study.sweep import SweepConfig
 from tests.study.synthetic import rows
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import pytest
 
-from jaxbiped.report.answer import SUCCESS, TIME
+from jaxbiped.report.answer_text import SUCCESS, TIME
 from jaxbiped.report.sweep_answer import idle_sentence, measure_sentence, sentences
-from jaxbiped.study import Estimate, compare
-from jaxbiped.study.idle_axes import IdleSpan
-from jaxbiped.study.pointwise import PointResult, SweepResult
+from jaxbiped.statistics import Estimate, compare
+from jaxbiped.statistics.idle_axes import IdleSpan
+from jaxbiped.statistics.sweep_points import PointResult, SweepResult
 from tests.study.synthetic import rows
 
 PAIR = compare(rows(30, strategies=("full", "floor_only")), resamples=20).pair("full", "floor_only")

@@ -16,7 +16,7 @@ from jaxbiped.report.sweep_page import write_sweep_page
 from jaxbiped.study import create
 from tests.report.html_reader import Reader
 from tests.study.synthetic import rows
-from tests.study.test_sides import other, stored
+from tests.study.test_stored_series import other, stored
 
 C3, WIDTH = {"field": "costs.c3", "values": [5.0, 10.0, 20.0]}, {"field": "population.bump_width", "values": [0.2, 0.4]}
 

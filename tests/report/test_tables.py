@@ -7,10 +7,10 @@ import polars as pl
 import pytest
 from rich.console import Console
 
-from jaxbiped.report.answer import DISTANCE, SUCCESS, TIME, answer, verdict
+from jaxbiped.report.answer_text import DISTANCE, SUCCESS, TIME, answer, verdict
 from jaxbiped.report.tables import comparison_table, markdown_sheets, pair_sheet, terminal, to_markdown, to_rich
 from jaxbiped.report.words import AHEAD, BEHIND, OPEN, brackets, p_cell, p_value, percent, signed
-from jaxbiped.study import ALL, QUESTION, Estimate, compare
+from jaxbiped.statistics import ALL, QUESTION, Estimate, compare
 from tests.study.synthetic import rows
 
 FRAME = rows(240)

@@ -9,18 +9,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxbiped import sensing
+from jaxbiped import localisation, sensing
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.localisation.kalman_filter import predict_seen
+from jaxbiped.localisation.scan_match import add_walls, find_walls, match, no_outlines
 from jaxbiped.mapping.grid import GridSpec
-from jaxbiped.mapping.scan_match import add_walls, find_walls, match, no_outlines
 from jaxbiped.sensing import CameraConfig, ImageSpec, LandmarkConfig, NoiseConfig, OdometryConfig, Sightings, View
 from jaxbiped.sensing import VisualConfig as Visual
 from jaxbiped.sensing.camera import mount
-from jaxbiped.sensing.localisation import predict_seen
 from jaxbiped.sensing.motion import track
-from jaxbiped.sensing.stereo import Disparity, MatchParams, StereoCamera, ideal, to_points
-from jaxbiped.sensing.stereo import match as match_pair
 from jaxbiped.sensing.view import Motion
+from jaxbiped.stereo import Disparity, MatchParams, StereoCamera, ideal, to_points
+from jaxbiped.stereo import match as match_pair
 from tests import fuzzing
 from tests.fuzzing import close, mapped, same, spoiled
 from tests.sensing.scenes import as_jax, make
@@ -34,7 +34,7 @@ HERE = Pose(*(jnp.float32(v) for v in (0.1, 0.7, 0.0, 0.0)))
 SEED = jnp.uint32(3)
 MOVED, SPREAD = tuple(jnp.float32(v) for v in (0.05, 0.01, 0.1)), jnp.full(3, 1e-4)
 MOTION = Motion(*MOVED, jnp.eye(3) * 1e-4, jnp.bool_(True))
-BELIEF = replace(sensing.known(HERE), cov=jnp.eye(3) * 1e-3)
+BELIEF = replace(localisation.known(HERE), cov=jnp.eye(3) * 1e-3)
 SEEN = Sightings(
     x=jnp.array([0.52, 0.51, 0.0, 0.0, 0.0]),
     y=jnp.array([-0.05, 0.1, 0.0, 0.0, 0.0]),
@@ -71,9 +71,9 @@ def cases():
         **spoiled("sight_landmarks", sensing.sight_landmarks, marks, optional),
         **spoiled("measure_oracle", sensing.measure_oracle, true, optional),
         **spoiled("drift", sensing.drift, drift),
-        **spoiled("known", sensing.known, {"pose": HERE}),
-        **spoiled("predict", sensing.predict, told),
-        **spoiled("correct", sensing.correct, {"belief": BELIEF, "landmarks": ARENA.landmarks, "sightings": SEEN}),
+        **spoiled("known", localisation.known, {"pose": HERE}),
+        **spoiled("predict", localisation.predict, told),
+        **spoiled("correct", localisation.correct, {"belief": BELIEF, "landmarks": ARENA.landmarks, "sightings": SEEN}),
         **spoiled("predict_seen", predict_seen, motion),
         **spoiled("track", track, visual),
         **spoiled("find_walls", find_walls, walls),
@@ -106,13 +106,17 @@ def cases():
     ):  # fmt: skip
         refused(sensing.measure_oracle, true, **wrong)
     for value in (np.nan, np.inf):
-        refused(sensing.predict, told, dx=value)
-        refused(sensing.predict, told, variances=np.array([0, value, 0]))
+        refused(localisation.predict, told, dx=value)
+        refused(localisation.predict, told, variances=np.array([0, value, 0]))
         refused(sensing.drift, drift, displacement=(0.0, value, 0.0))
-    refused(sensing.predict, told, variances=np.array([0, -1e-9, 0]))
+    refused(localisation.predict, told, variances=np.array([0, -1e-9, 0]))
     refused(sensing.drift, drift, noise=replace(ODOMETRY, forward=np.nan))
     refused(
-        sensing.correct, {}, belief=BELIEF, landmarks=ARENA.landmarks, sightings=jax.tree.map(lambda v: v[:4], SEEN)
+        localisation.correct,
+        {},
+        belief=BELIEF,
+        landmarks=ARENA.landmarks,
+        sightings=jax.tree.map(lambda v: v[:4], SEEN),
     )
     for wrong in ({"shape": (5, 3)}, {"shape": (4, 3, 1)}, {"step": 0}, {"step": 4}, {"shape": (-4, -3)}):
         refused(find_walls, walls, **wrong)
@@ -203,7 +207,7 @@ def nowhere():
 
 
 def strange_sightings():
-    correct = jax.jit(sensing.correct)
+    correct = jax.jit(localisation.correct)
     without = correct(BELIEF, ARENA.landmarks, replace(SEEN, seen=SEEN.seen.at[1].set(False)))
     for name in ("x", "y", "sd"):
         for value in (np.nan, np.inf):
@@ -216,9 +220,9 @@ def strange_sightings():
 def other_types():
     """Whole numbers, doubles, lists, and seeds of NumPy or Python."""
     drift = [sensing.drift((0, np.float64(1), 0.5), ODOMETRY, seed) for seed in (SEED, 3, np.int64(3), np.uint32(3))]
-    listed = sensing.predict(sensing.known(Pose(1, 2, 0, 0)), 1, np.int8(2), 0.5, [1, 0, 2])
-    plain = sensing.predict(
-        sensing.known(Pose(*jnp.array([1.0, 2, 0, 0]))), *jnp.array([1.0, 2, 0.5]), jnp.array([1.0, 0, 2])
+    listed = localisation.predict(localisation.known(Pose(1, 2, 0, 0)), 1, np.int8(2), 0.5, [1, 0, 2])
+    plain = localisation.predict(
+        localisation.known(Pose(*jnp.array([1.0, 2, 0, 0]))), *jnp.array([1.0, 2, 0.5]), jnp.array([1.0, 0, 2])
     )
     return same(*drift) and same(listed, plain)
 
@@ -228,8 +232,8 @@ def gradients():
 
     def pose(moved, shift):
         moved, variances = sensing.drift(tuple(moved), ODOMETRY, SEED)
-        belief = sensing.predict(BELIEF, *moved, variances)
-        belief = sensing.correct(belief, ARENA.landmarks, replace(SEEN, x=SEEN.x + shift))
+        belief = localisation.predict(BELIEF, *moved, variances)
+        belief = localisation.correct(belief, ARENA.landmarks, replace(SEEN, x=SEEN.x + shift))
         return belief.pose.x + 2 * belief.pose.y + 3 * belief.pose.yaw
 
     both, moved = jax.jit(jax.value_and_grad(pose, (0, 1))), jnp.stack(MOVED)
@@ -251,7 +255,7 @@ def oracles_in_batches():
 def beliefs_in_batches():
     def go(x, seed):
         moved, variances = sensing.drift((x, 0.0, 0.1), ODOMETRY, seed)
-        belief = sensing.predict(sensing.known(replace(HERE, x=x)), *moved, variances)
-        return sensing.correct(belief, ARENA.landmarks, SEEN)
+        belief = localisation.predict(localisation.known(replace(HERE, x=x)), *moved, variances)
+        return localisation.correct(belief, ARENA.landmarks, SEEN)
 
     return mapped(go, jnp.array([0.05, 0.1]), jnp.array([1, 2], jnp.uint32))

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.sensing import Belief, VisualConfig, predict
+from jaxbiped.localisation import Belief, predict
+from jaxbiped.localisation.kalman_filter import predict_seen
+from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.camera import mount
-from jaxbiped.sensing.localisation import predict_seen
 from jaxbiped.sensing.motion import SHARE, nothing, overlap, track
 from jaxbiped.sensing.view import Motion, View
 from tests.reference import sensing as reference

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import polars as pl
 
+from jaxbiped.study.batching import shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import shards
 from tests.study.synthetic import rows
 
 STRATEGIES = ("full", "floor_only")
@@ -31,6 +31,6 @@ def engine(config, on_progress=None, *, points, done, begun=None, pause=0.0):
 if __name__ == "__main__":
     from functools import partial
 
-    from jaxbiped.study.conduct import conduct
+    from jaxbiped.study.run_study import conduct
 
     conduct(Path(sys.argv[1]), CONFIG, engine=partial(engine, begun=sys.argv[2], pause=0.15))

@@ -13,7 +13,7 @@ from pathlib import Path
 import polars as pl
 
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import evaluate
+from jaxbiped.study.evaluation import evaluate
 
 FOLDER = Path(__file__).parents[1] / "data" / "golden"
 EVERY = {"arenas": 12}

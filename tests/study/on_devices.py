@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from jaxbiped import planning
-from jaxbiped.study.conduct import conduct
+from jaxbiped.study.run_study import conduct
 from jaxbiped.study.sweep import SweepConfig
 
 AXIS = {"field": "costs.c3", "values": (5.0, 20.0)}

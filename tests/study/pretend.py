@@ -7,7 +7,7 @@ import time
 
 import polars as pl
 
-from jaxbiped.mission.queue import Tally
+from jaxbiped.mission.batched_driver import Tally
 from jaxbiped.study.worker import PAUSE
 from tests.study.engine import TABLE
 

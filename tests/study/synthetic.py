@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from jaxbiped.study import schema
+from jaxbiped.statistics import schema
 
 HANDICAP = {"full": 0.0, "bump_aware": 0.4, "gate_aware": 0.9, "floor_only": 1.2, "blind_stop": 2.4}
 DETOUR = {"bump": 0.35, "stairs": 0.30, "mixed": 0.20, "gate": 0.05}  # [m] of floor_only over the crossing, on average

@@ -21,7 +21,7 @@ from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.study import cluster, store
 from jaxbiped.study.cluster import Cluster, connect, local_cluster
-from jaxbiped.study.conduct import conduct
+from jaxbiped.study.run_study import conduct
 from tests.study import pretend
 from tests.study.engine import CONFIG, TABLE, engine
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxbiped.mission.library import load_library
-from jaxbiped.motion.primitives import DurationConfig
+from jaxbiped.motion.config import DurationConfig
 from jaxbiped.study.durations import fit, table_2
 
 PAPER = [1.0, 1.0, 5.0, 10.0]

@@ -29,7 +29,7 @@ PARTS = {
 }  # modules of the package, which are the examples
 SCRIPT = """
 import jaxbiped as jb
-from jaxbiped.study.groups import groups_of
+from jaxbiped.study.batching import groups_of
 
 study = jb.Study(jb.RandomArenas(families=["bump", "lab-corridor"], count=2), ["full", "lab-careful"],
                  sensor="lab-fog", executor="lab-slip", metrics=["spl", "lab_turns"])

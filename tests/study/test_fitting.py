@@ -5,7 +5,7 @@ import pytest
 
 from jaxbiped.mission.eyes import StereoEyes
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.sensing.camera import CameraConfig
+from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.study import fitting
 from jaxbiped.study.fitting import choices, fewest_rays
 from jaxbiped.study.sensors import Place

@@ -18,12 +18,12 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.strategies import Strategy
 from jaxbiped.planning import Costs
 from jaxbiped.planning.planners import GridPlanner, Route, StraightLine, check_route
-from jaxbiped.study.again import play_again
-from jaxbiped.study.comparison import compare
-from jaxbiped.study.conduct import conduct, in_order, shard_rows
+from jaxbiped.statistics.comparison import compare
+from jaxbiped.study.batching import families_of, group_points, only_point, shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import families_of, group_points, only_point, shards
 from jaxbiped.study.manifest import Manifest
+from jaxbiped.study.replay import play_again
+from jaxbiped.study.run_study import conduct, in_order, shard_rows
 from jaxbiped.study.runner import numbered
 from jaxbiped.study.store import read_points
 from tests.study.synthetic import rows

@@ -8,11 +8,11 @@ import pytest
 from jaxbiped.errors import InputError
 from jaxbiped.report.folder_report import write_report
 from jaxbiped.report.stopping import stopping_sentences
+from jaxbiped.statistics.sequential import Goal
 from jaxbiped.study import store
-from jaxbiped.study.conduct import conduct
+from jaxbiped.study.batching import shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.groups import shards
-from jaxbiped.study.sequential import Goal
+from jaxbiped.study.run_study import conduct
 from jaxbiped.study.stopping import STOPPING, Rule, read_stopping
 from tests.study.synthetic import rows
 

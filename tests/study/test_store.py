@@ -14,9 +14,9 @@ import pytest
 from jaxbiped import files
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
+from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study import store
 from jaxbiped.study.lock import FolderLock
-from jaxbiped.study.schema import SCHEMA
 from tests.study.synthetic import rows
 
 FRAME = rows(20)

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from jaxbiped.arenas.population import PopulationConfig
+from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.config import parse
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.study import memory
-from jaxbiped.study.conduct import table
-from jaxbiped.study.groups import group_points, shards
-from jaxbiped.study.memory import check_memory
+from jaxbiped.study import memory_limit
+from jaxbiped.study.batching import group_points, shards
+from jaxbiped.study.memory_limit import check_memory
+from jaxbiped.study.run_study import table
 from jaxbiped.study.sweep import SweepConfig
 
 STRATEGIES = ("full", "floor_only")
@@ -210,12 +210,12 @@ def test_more_points_than_memory_holds_are_refused(monkeypatch):
         sweep(*({"field": f"costs.c{k}"} | long for k in range(1, 4)))
     static = group_points(sweep(C3).points(), STRATEGIES)[0].static
     check_memory(static, 64, 2, 1024, 2)
-    monkeypatch.setattr(memory, "memory", lambda: 2**31)
+    monkeypatch.setattr(memory_limit, "memory", lambda: 2**31)
     with pytest.raises(InputError, match=r"shard: 64 points x 2 strategies: at most (\d+) arenas a shard fit") as stop:
         check_memory(static, 64, 2, 65536, 2)
     fit = int(str(stop.value).split("at most ")[1].split()[0])
     check_memory(static, 64, 2, fit, 2)
-    monkeypatch.setattr(memory, "memory", lambda: 2**26)
+    monkeypatch.setattr(memory_limit, "memory", lambda: 2**26)
     with pytest.raises(InputError, match=r"need [0-9.]+ GiB, of 0.1 that may be used; sweep fewer points"):
         check_memory(static, 2000, 2, 1024, 2)
 

@@ -5,7 +5,7 @@ import pydantic
 import pytest
 
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluate import evaluate
+from jaxbiped.study.evaluation import evaluate
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import pydantic
 from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
 from jaxbiped.commands.options.engine import EngineArgs
 from jaxbiped.commands.options.strategies import strategy_notes
+from jaxbiped.core.names import MEASURES
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.names import MEASURES
 
 
 class CompareArgs(EngineArgs, RobotFileOptions, CameraFileOptions, StudyConfig):

@@ -7,8 +7,8 @@ from typing import Annotated, ClassVar, Literal
 
 import pydantic
 
+from jaxbiped.biped.primitive_catalogue import PAPER, Pace
 from jaxbiped.commands.options.base import Options
-from jaxbiped.motion.catalogue import PAPER, Pace
 from jaxbiped.motion.config import Goal
 
 Name = Literal[tuple(PAPER)]

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from jaxbiped.commands.options.charting import ChartArgs
 from jaxbiped.mapping.config import ONE_LOOK, ChartConfig
-from jaxbiped.sensing.stereo.config import MatchParams
+from jaxbiped.stereo.config import MatchParams
 
 
 class StereoArgs(ChartArgs):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from jaxbiped.study.names import STRATEGIES
+from jaxbiped.core.names import STRATEGIES
 
 DARES = {
     "full": "steps over bumps and passes gates",

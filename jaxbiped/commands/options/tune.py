@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 from jaxbiped.commands.options.base import CameraFileOptions, RobotFileOptions
 from jaxbiped.commands.options.strategies import strategy_notes
-from jaxbiped.study.names import STRATEGIES
+from jaxbiped.core.names import STRATEGIES
 from jaxbiped.study.tuning_config import TuneConfig
 
 

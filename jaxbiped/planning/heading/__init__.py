@@ -1,11 +1,11 @@
 """Planning over (cell, heading) with the times of the primitives: the time-optimal way, turns included."""
 
-from jaxbiped.core.lazy_package import lazy_package
+from jaxbiped.core.lazy_loading import lazy_package
 
 lazy_package(
     __name__,
     {
-        "crossing": "crossing_faces",
+        "edge_direction": "crossing_faces",
         "field": "HeadingField heading_field",
         "path": "heading_path path_time",
         "times": "Moves Times heading_moves",

@@ -15,10 +15,10 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped.core.batching import folding_vmap, unfold, without_gradient
 from jaxbiped.core.checks import reals
 from jaxbiped.errors import InputError
-from jaxbiped.planning import compiled
+from jaxbiped.planning import kernels
 from jaxbiped.planning.arguments import are_classes, grid_arguments
+from jaxbiped.planning.cost_field import FEW, LARGE
 from jaxbiped.planning.costs import BASE_PITCH, DIRECTIONS, Rules
-from jaxbiped.planning.field import FEW, LARGE
 from jaxbiped.planning.heading.times import Moves, Times, checked_pitch, heading_moves, moves_of
 
 METHODS = ("wavefront", "line_sweep", "dijkstra")
@@ -108,7 +108,7 @@ def solve(classes, levels, times: Times, rules: Rules, goal_ij, extra=None, *, p
         if method == "wavefront":
             cost, proven = wavefront(moves.time, moves.face, times.turn, goal_ij)
         else:
-            cost, proven = compiled.solve_headings(moves.time, moves.face, times.turn, goal_ij, method)
+            cost, proven = kernels.solve_headings(moves.time, moves.face, times.turn, goal_ij, method)
         return HeadingField(cost, moves, times.turn, valid & proven)
 
 

@@ -26,7 +26,7 @@ from jaxbiped.planning.costs import (
     cell_kinds,
     move_kind,
 )
-from jaxbiped.planning.heading.crossing import beside, crossing_faces
+from jaxbiped.planning.heading.edge_direction import beside, crossing_faces
 
 LEAST = 0.05  # [s] that a move takes at least: a way must come nearer to its goal with each cell
 REACH = math.sqrt(2.0)  # [cells of 5 cm] that a step over an edge carries the robot forward, at most

@@ -1,0 +1,267 @@
+"""The compiled driver: a queue of missions worked off by a fixed number of slots.
+
+Missions differ in length by a factor of ten, and a batch that waits for its longest member idles most of its slots. So
+a slot whose mission has ended takes the next job at once, inside the compiled loop. What a slot computes
+does not depend on its neighbours, hence a mission's result depends neither on the number of slots nor on its
+place in the queue. On several devices each works off a list of jobs of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.sharding import Mesh
+from jaxtyping import Array, Float, Int, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.core.ready_programs import ready
+from jaxbiped.devices import ALL, EACH, on_each, placed
+from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.mission_step import step
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState, Planned, WorldState, start
+
+SLOTS = 64  # missions at once: maps of this many arenas fit the cache of one core
+TURNS = 32  # decisions between two looks of the host at the queue
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Jobs:
+    """`N` missions to run: which arena, under which settings, with which noise."""
+
+    arena: Int[Array, "N"]  # index into the arenas
+    point: Int[Array, "N"]  # index into the settings
+    seed: UInt32[Array, "N"]
+    count: Int[Array, ""]  # jobs from here on are padding
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Result:
+    """How each mission ended."""
+
+    code: Int[Array, "N"]  # Code; RUNNING where it has not
+    distance: Float[Array, "N"]  # [m] walked
+    time: Float[Array, "N"]  # [s]
+    measurements: Int[Array, "N"]
+    decisions: Int[Array, "N"]
+    goal_distance: Float[Array, "N"]  # [m] from the goal, at the end
+    pose_error: Float[Array, "N"]  # [m] from where the robot believed to stand, at the end
+    yaw_error: Float[Array, "N"]  # [rad] the same of its yaw
+    planned: Planned
+    metrics: tuple = ()  # what each metric remembers at the end
+
+
+def ending(world: WorldState, goal_xy: Float[Array | np.ndarray, "*N 2"]) -> Result:
+    """How missions ended whose worlds these are, in arenas with these goals."""
+    away = jnp.hypot(goal_xy[..., 0] - world.pose.x, goal_xy[..., 1] - world.pose.y)
+    done = world.code, world.distance, world.time, world.measurements, world.decisions
+    return Result(*done, away, world.pose_error, world.yaw_error, world.planned, world.metrics)
+
+
+def no_results(*shape: int, metrics: tuple = ()) -> Result:
+    """Zeros, on the host.
+
+    Args:
+      metrics: arrays, or their shapes and types, of what the metrics of one mission remember.
+    """
+    kinds = int, float, float, int, int, float, float, float
+    planned = Planned(*(np.zeros(shape, kind) for kind in (float, int, float)))
+    remembered = jax.tree.map(lambda leaf: np.zeros((*shape, *leaf.shape), leaf.dtype), metrics)
+    return Result(*(np.zeros(shape, kind) for kind in kinds), planned, remembered)
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Queue:
+    """The state between two segments of the loop."""
+
+    world: WorldState  # [S]
+    mind: AgentState  # [S]
+    job: Int[Array, "S"]  # that the slot works on; count or more: idle
+    next_job: Int[Array, ""]
+    result: Result
+
+
+@dataclass(frozen=True)
+class Tally:
+    """How far a queue is."""
+
+    ended: int  # missions
+    reached: int  # of these, as they should
+
+    def __add__(self, other: Tally) -> Tally:
+        return Tally(self.ended + other.ended, self.reached + other.reached)
+
+
+def tally(code: Int[np.ndarray, "N"]) -> Tally:
+    """Of a queue's codes so far."""
+    return Tally(int(np.sum(code != Code.RUNNING)), int(np.sum(code == Code.REACHED)))
+
+
+OnProgress = Callable[[Tally], None]
+Work = Callable[[Arena, MissionParams, Jobs, OnProgress], Result]
+
+
+@with_own_settings
+def compile_queue(
+    arenas: Arena,
+    settings: MissionParams,
+    jobs: Jobs,
+    program: MissionSpec,
+    slots: int = SLOTS,
+    mesh: Mesh | None = None,
+) -> Work:
+    """The compiled driver for arguments of these shapes.
+
+    Args:
+      arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
+      program: static. One compilation for each (program, slots, A, P, N), which later calls share.
+      slots: static; of each device.
+      mesh: static; devices of which each has a list of jobs, and `fill` and `segment` of its own: leaves of jobs,
+        count too, and of results have another axis [D] then, the first.
+
+    Returns:
+      A function of (arenas, settings, jobs, on_progress) that works the queue off and gives results in the order of
+      the jobs; padding stays RUNNING. It may be called by several threads at once. `on_progress` is called on the
+      host with the tally of the jobs, every `TURNS` decisions.
+    """
+    signature = (program, slots, mesh, jax.tree.structure((arenas, settings, jobs)), *shapes((arenas, settings, jobs)))
+    if signature not in COMPILED:
+        begun, turned = partial(fill, program=program, slots=slots), partial(segment, program=program)
+        if mesh is None:
+            begun, turned = jax.jit(begun), jax.jit(turned, donate_argnums=0)
+        else:
+            begun = on_each(on_row(begun, 2), mesh, (ALL, ALL, EACH))
+            turned = on_each(on_row(turned, 0, 3), mesh, (EACH, ALL, ALL, EACH), donate_argnums=0)
+        queue = jax.eval_shape(begun, arenas, settings, jobs)
+        given, going = (arenas, settings, jobs), (queue, arenas, settings, jobs)
+        if mesh is None:
+            static = program, slots, TURNS
+            COMPILED[signature] = (
+                ready("queue.fill", given, static, lambda: begun.lower(*given)),
+                ready("queue.segment", going, static, lambda: turned.lower(*going), wide),
+            )
+        else:
+            COMPILED[signature] = begun.lower(*given).compile(), wide(turned.lower(*going))
+    first, further = COMPILED[signature]
+
+    @with_own_settings
+    def work(arenas: Arena, settings: MissionParams, jobs: Jobs, on_progress: OnProgress) -> Result:
+        if mesh is not None:
+            arenas, settings, jobs = placed(arenas, mesh, ALL), placed(settings, mesh, ALL), placed(jobs, mesh, EACH)
+        count = np.asarray(jobs.count)[..., None]
+        queue = first(arenas, settings, jobs)
+        while True:
+            queue = further(queue, arenas, settings, jobs)
+            code, job = jax.device_get((queue.result.code, queue.job))
+            on_progress(tally(code))
+            if np.all(job >= count):
+                return queue.result
+
+    return work
+
+
+COMPILED: dict = {}
+
+
+def on_row(function: Callable, *which: int) -> Callable:
+    """`function` for arguments of which some have a leading axis of size 1, and then the result has."""
+
+    def call(*arguments):
+        arguments = [
+            jax.tree.map(lambda leaf: leaf[0], argument) if k in which else argument
+            for k, argument in enumerate(arguments)
+        ]
+        return jax.tree.map(lambda leaf: leaf[None], function(*arguments))
+
+    return call
+
+
+def wide(lowered: jax.stages.Lowered) -> jax.stages.Compiled:
+    """Compiled with vectors of 512 bits where a CPU has them; the default of half of that is a few per cent slower."""
+    try:
+        return lowered.compile(compiler_options={"xla_cpu_prefer_vector_width": 512})
+    except jax.errors.JaxRuntimeError:  # a compiler that has no such option
+        return lowered.compile()
+
+
+def shapes(tree) -> list:
+    """Shape and type of each leaf."""
+    return [(leaf.shape, str(leaf.dtype)) for leaf in jax.tree.leaves(tree)]
+
+
+def fill(arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpec, slots: int) -> Queue:
+    """The queue with its first jobs in the slots."""
+    job = jnp.arange(slots, dtype=jnp.int32)
+    world, mind = begin(arenas, settings, jobs, job, program)
+    zero, none = jnp.zeros(jobs.arena.shape), jnp.zeros(jobs.arena.shape, jnp.int32)
+    planned = Planned(zero, none, zero)
+    metrics = jax.tree.map(lambda leaf: jnp.zeros((*zero.shape, *leaf.shape[1:]), leaf.dtype), world.metrics)
+    result = Result(none + Code.RUNNING, zero, zero, none, none, zero, zero, zero, planned, metrics)
+    return Queue(world, mind, job, jnp.int32(slots), result)
+
+
+def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpec) -> Queue:
+    """Up to `TURNS` decisions of every slot."""
+
+    def unfinished(carry: tuple[Array, Queue]):
+        turns, queue = carry
+        return (turns < TURNS) & jnp.any(queue.job < jobs.count)
+
+    def turn(carry: tuple[Array, Queue]):
+        turns, queue = carry
+        at = jnp.minimum(queue.job, jobs.arena.shape[0] - 1)
+        arena = pick(arenas, jobs.arena[at])
+        world, mind, *_ = step(queue.world, queue.mind, arena, pick(settings, jobs.point[at]), program)
+        return turns + 1, advance(Queue(world, mind, queue.job, queue.next_job, queue.result), arena)
+
+    def advance(queue: Queue, arena: Arena) -> Queue:
+        """Write down the missions that have ended, and give their slots the next jobs."""
+        world = queue.world
+        ended = (queue.job < jobs.count) & (world.code != Code.RUNNING)
+        last = ending(world, arena.goal_xy)
+        row = jnp.where(ended, queue.job, jobs.arena.shape[0])
+        result = jax.tree.map(lambda all, new: all.at[row].set(new, mode="drop"), queue.result, last)
+        job = jnp.where(ended, queue.next_job + jnp.cumsum(ended) - 1, queue.job).astype(jnp.int32)
+        fresh_world, fresh_mind = begin(arenas, settings, jobs, job, program)
+
+        def renew(new, old):
+            return jnp.where(ended.reshape(-1, *[1] * (new.ndim - 1)), new, old)
+
+        world = jax.tree.map(renew, fresh_world, world)
+        # The map is left as it is: a fresh mind does not look at it, and wiping it here costs a pass over it.
+        grid_map = queue.mind.grid_map
+        mind = jax.tree.map(renew, replace(fresh_mind, grid_map=None), replace(queue.mind, grid_map=None))
+        mind = replace(mind, grid_map=grid_map)
+        return Queue(world, mind, job, queue.next_job + jnp.sum(ended, dtype=jnp.int32), result)
+
+    return jax.lax.while_loop(unfinished, turn, (jnp.int32(0), queue))[1]
+
+
+def begin(
+    arenas: Arena, settings: MissionParams, jobs: Jobs, job: Int[Array, "S"], program: MissionSpec
+) -> tuple[WorldState, AgentState]:
+    """Fresh missions for the jobs of all slots; a slot without a job has one that has ended."""
+    at = jnp.minimum(job, jobs.arena.shape[0] - 1)
+    arena, setting = pick(arenas, jobs.arena[at]), pick(settings, jobs.point[at])
+    begun = jax.vmap(start, in_axes=(0, 0, 0, None, None))
+    world, mind = begun(arena, setting, jobs.seed[at], program.spec, program.localisation)
+    return replace(world, code=jnp.where(job < jobs.count, world.code, Code.REACHED)), mind
+
+
+def pick(tree, index: Int[Array, "S"]):
+    """Rows `index` of every leaf."""
+    return jax.tree.map(lambda leaf: leaf[index], tree)
+
+
+def stack(trees: list):
+    """Pytrees of the same kind as one, with a new leading axis."""
+    return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *trees)

@@ -1,0 +1,45 @@
+"""The referee's rule for obstacles that move: whether one of them runs into the robot, or the robot into it."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.moving_boxes import boxes_at, only
+from jaxbiped.geometry.boxes import plan_distance
+from jaxbiped.mission.execution import TOUCH, Execution
+from jaxbiped.mission.settings import MissionParams
+from jaxbiped.mission.state import WorldState
+from jaxbiped.motion.primitives import Command
+
+CHECKS = 64  # moments of a measurement and what follows it: 3 cm of an obstacle's way at 0.02 m/s and 106 s
+
+
+def met(
+    arena: Arena, world: WorldState, command: Command, executed: Execution, settings: MissionParams
+) -> Bool[Array, ""]:
+    """Whether a box that moves touches one robot while it measures, or while it carries out its command.
+
+    The robot is an upright cylinder of the body's radius, from a step above its ground to its head. It stands while it
+    measures, and then goes straight, and at constant speed, to where it ends: turns take their time on the way.
+    """
+    if arena.movers is None:
+        return jnp.zeros((), bool)
+    moving, measuring = only(arena, moving=True), settings.durations.measure
+    after = jnp.linspace(0.0, 1.0, CHECKS) * (measuring + executed.time)
+    part = jnp.clip((after - measuring) / jnp.maximum(executed.time, 1e-3), 0.0, 1.0)
+    x = world.pose.x + part * (executed.pose.x - world.pose.x)
+    y = world.pose.y + part * (executed.pose.y - world.pose.y)
+    foot = jnp.maximum(world.pose.z, executed.pose.z)
+    head = foot + jnp.where(command.squat, settings.body.squatting, settings.body.standing)
+    boxes = moving.boxes
+    between = boxes.used & (boxes.top > foot + settings.body.step + TOUCH) & (boxes.bottom < head - TOUCH)
+
+    def touched(time, x, y):
+        return jnp.any(
+            between & (plan_distance(boxes_at(moving, world.time + time), x, y) < settings.limits.body_radius)
+        )
+
+    return jnp.any(jax.vmap(touched)(after, x, y))

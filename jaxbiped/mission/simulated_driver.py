@@ -1,0 +1,293 @@
+"""The driver of simulated bipeds: a batch of them walks, each in its own arena, and those that are done decide.
+
+Each slot has a tape of servo targets and its own place on it. The batch is stepped in short slices; after each, the
+slots whose tape has ended (or that fell, or hit something) sense from where their cameras really are, and decide
+together. None waits for another. A slot whose mission has ended takes the next job. In `native` physics a mission
+depends, bit for bit, neither on the number of slots, nor on its neighbours or its place in the queue.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol, runtime_checkable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int, UInt32
+
+from jaxbiped import physics
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.ground import refuse_terrain
+from jaxbiped.biped.gait import TIMESTEP
+from jaxbiped.biped.model import robot_spec
+from jaxbiped.errors import InputError
+from jaxbiped.geometry.pose import Pose
+from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mapping import GridSpec
+from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, ending, no_results, tally
+from jaxbiped.mission.decision import DecisionTrace
+from jaxbiped.mission.eyes import Eyes
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.primitive_schedule import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
+from jaxbiped.mission.recorded_driver import Mission, Played, Recorder
+from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
+from jaxbiped.mission.simulated_step import (
+    Plan,
+    choose_rows,
+    fresh,
+    gather,
+    judge,
+    judge_and_think,
+    no_plan,
+    scatter,
+    think_on,
+)
+from jaxbiped.mission.stage import Stage
+from jaxbiped.mission.state import AgentState, BodyPose, WorldState, start
+from jaxbiped.motion.grid_units import CELL
+from jaxbiped.motion.primitives import Command, Primitive
+
+SLICE = 32  # steps (0.16 s) between two looks at who is done
+SETTLE = 0.3  # [s] that a robot stands before it measures
+LEVEL = GridSpec().level_height  # [m]
+HEADROOM = 1e-4  # [m] that the simulated head may be higher than the map's, by rounding
+ROWS = 8  # robots that decide in one call: the same program, whatever the number of slots
+
+
+@runtime_checkable
+class Observer(Protocol):
+    """Is told of missions as they go; all pytrees have a leading axis of 1."""
+
+    def decided(self, job: int, world: WorldState, command: Command, thought: DecisionTrace, /) -> None: ...
+
+    def concluded(self, job: int, world: WorldState, mind: AgentState, /) -> None: ...
+
+    def moved(self, job: int, qpos: Float[np.ndarray, "nq"], /) -> None: ...
+
+
+@with_own_settings
+def walk(
+    arenas: Arena,
+    settings: MissionParams,
+    jobs: Jobs,
+    program: MissionSpec,
+    config: WalkConfig,
+    on_progress: OnProgress = lambda tally: None,
+    observer: Observer | None = None,
+    eyes: Eyes | None = None,
+) -> Result:
+    """Work a queue of missions off; `program.executor` names the physics.
+
+    Args:
+      arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
+      on_progress: called with the tally of the jobs.
+      eyes: what robots see with, where the program's sensor is no JAX.
+
+    Returns:
+      Results in the order of the jobs, on the host; padding stays RUNNING.
+
+    Raises:
+      InputError: a device that is not there, a biped that cannot play its primitives, or arenas with terrain.
+    """
+    refuse_terrain(arenas, f"executor {program.executor}")
+    return Walkers(arenas, settings, jobs, program, config, observer, eyes).work(on_progress)
+
+
+@with_own_settings
+def walk_logged(
+    arena: Arena,
+    settings: MissionParams,
+    seed: UInt32[Array, ""],
+    program: MissionSpec,
+    config: WalkConfig,
+    on_decision: Callable[[Played], None] = lambda _: None,
+    eyes: Eyes | None = None,
+) -> Mission:
+    """One mission of a simulated biped, with a log of everything; as `recorded_driver.run_logged` gives it."""
+    arenas, points, world = jax.tree.map(
+        lambda leaf: jnp.asarray(leaf)[None],
+        (arena, settings, start(arena, settings, seed, program.spec, program.localisation)[0]),
+    )
+    zero = jnp.zeros(1, jnp.int32)
+    recorder = Recorder(settings, program, on_decision, eyes)
+    jobs = Jobs(zero, zero, jnp.asarray(seed)[None], jnp.int32(1))
+    walk(arenas, points, jobs, program, config, observer=recorder, eyes=eyes)
+    return recorder.mission(arena, world)
+
+
+def rehearse(config: MissionConfig) -> None:
+    """Refuse what cannot be simulated, before anything is written, printed or compiled at length.
+
+    Raises:
+      InputError: a device or a package that is not there, a biped that cannot play its primitives, or one that is
+        higher than the robot that the map is made for.
+    """
+    if config.executor not in SIMULATED:
+        return
+    walk, robot = config.walk, config.robot
+    for stance, height in (("standing", walk.biped.head_standing), ("squatting", walk.biped.head_squatting)):
+        if getattr(robot, stance) < height - HEADROOM:
+            message = f"must be at least the height of the simulated biped, {height:.3f} m"
+            raise InputError(message, field=f"robot.{stance}", value=getattr(robot, stance))
+    for squat, primitive in ((False, Primitive.STRAIGHT_FORWARD), (True, Primitive.PASS_GATE)):
+        for request in requests(Move(math.pi / 4, primitive, CELL, 0, squat), not squat, LEVEL, walk.pace):
+            targets(request, walk.biped)
+    for rise, primitive in ((1, Primitive.STEP_UP_BUMP), (-1, Primitive.STEP_DOWN_BUMP)):
+        for request in requests(Move(0.0, primitive, FURTHEST_CLIMB, rise, False), False, LEVEL, walk.pace):
+            targets(request, walk.biped)
+    physics.make(config.executor, robot_spec(walk.biped), 1, **walk.options(config.executor))
+
+
+class Walkers:
+    """The slots, and the queue that they work off."""
+
+    def __init__(self, arenas, settings, jobs, program: MissionSpec, config: WalkConfig, observer=None, eyes=None):
+        self.arenas, self.settings, self.jobs = arenas, settings, jobs
+        self.program, self.config, self.observer, self.eyes = program, config, observer, eyes
+        self.arena_of, self.point_of = np.asarray(jobs.arena), np.asarray(jobs.point)
+        self.count = int(jobs.count)
+        self.step, self.rise = np.asarray(settings.body.step), np.asarray(settings.limits.rise)
+        size = max(1, min(config.slots, self.count))
+        options = config.options(program.executor) | {"work": any(metric.of_servos for metric in settings.metrics)}
+        self.stage = Stage(program.executor, size, jax.device_get(arenas.boxes), config.biped, **options)
+        self.job, self.next_job = np.arange(size), size
+        self.squat = np.zeros(size, bool)
+        self.tapes = [self.stage.rest(False)] * size
+        self.place, self.length = np.zeros((2, size), int)  # on the tape; beyond its end the last row is held
+        jobs_in_all = len(self.arena_of)
+        self.goals = np.asarray(arenas.goal_xy)
+        self.world, self.mind = fresh(arenas, settings, jobs, jnp.asarray(self.job), program)
+        self.result = no_results(jobs_in_all, metrics=jax.tree.map(lambda leaf: leaf[0], self.world.metrics))
+        self.result.code[:] = Code.RUNNING
+        self.plan = no_plan(size)
+        self.enter(np.ones(size, bool))
+
+    def work(self, on_progress: OnProgress) -> Result:
+        """Until the queue is empty."""
+        while np.any(self.job < self.count):
+            stopped = self.stage.fell | self.stage.collided | ~self.stage.state.valid
+            ready = np.flatnonzero((self.job < self.count) & (stopped | (self.place >= self.length)))
+            for first in range(0, len(ready), ROWS):
+                self.turn(ready[first : first + ROWS])
+            if len(ready):
+                on_progress(tally(self.result.code))
+            else:
+                self.play()
+        return self.result
+
+    def play(self) -> None:
+        """Step all robots that have a job by a slice."""
+        ahead = [
+            tape[np.minimum(np.arange(place, place + SLICE), len(tape) - 1)]
+            for tape, place in zip(self.tapes, self.place, strict=True)
+        ]
+        self.stage.play(np.stack(ahead), self.job < self.count)
+        self.place += SLICE
+        if self.observer:
+            for s in np.flatnonzero(self.job < self.count):
+                self.observer.moved(int(self.job[s]), np.asarray(self.stage.state.qpos[s]))
+
+    def turn(self, ids: Int[np.ndarray, "n"]) -> None:
+        """What some robots did is judged; those whose missions go on sense and decide, others take the next jobs."""
+        stands = self.stage.stands(ids, self.squat[ids])
+        rows = np.resize(ids, ROWS)
+        feet, body = (jnp.asarray(np.resize(v, (ROWS, v.shape[1])).T, jnp.float32) for v in (stands.feet, stands.body))
+        carriage = BodyPose(Pose(*body[:4]), body[4], body[5])
+        world, mind, plan = gather((self.world, self.mind, self.plan), rows)
+        arena = gather(self.arenas, self.arena_of[self.job[rows]])
+        setting = gather(self.settings, self.point_of[self.job[rows]])
+        ends = self.stage.fell[rows], self.stage.collided[rows]
+        done = world, mind, plan, Pose(*feet)
+        if self.eyes:
+            world, moved, times = judge(*done, *ends, arena, setting, self.program)
+            seen = self.eyes.see(world, moved, arena, setting, carriage, len(ids))
+            mind, following, thought = think_on(world, moved, times, carriage, arena, setting, self.program, seen)
+        else:
+            world, moved, mind, following, thought = judge_and_think(
+                *done, carriage, *ends, arena, setting, self.program
+            )
+        mine = np.where(np.arange(ROWS) < len(ids), rows, len(self.job))
+        slots = self.world, self.mind, self.plan
+        self.world, self.mind, self.plan = scatter(slots, mine, (world, mind, following))
+        if self.observer:
+            self.tell(ids, plan, world, moved, following, thought)
+        world, command, verdict = jax.device_get((world, following.command, following.verdict))
+        ended = np.zeros(len(self.job), bool)
+        for k, s in enumerate(ids):
+            if world.code[k] != Code.RUNNING:
+                self.write(s, row(world, k))
+                ended[s] = True
+            else:
+                self.take(s, row(command, k), int(verdict[k]), stands.feet[k])
+        if ended.any():
+            self.renew(ended)
+
+    def take(self, s: int | np.integer, command: Command, verdict: int, feet: Float[np.ndarray, "4"]) -> None:
+        """A robot's next tape."""
+        point = self.point_of[self.job[s]]
+        step, rise = self.step[point], self.rise[point]
+        move = Move(
+            turn=float(command.turn),
+            primitive=Primitive(int(command.primitive)),
+            length=float(command.length),
+            rise=int(command.rise),
+            squat=bool(command.squat),
+            left=float(command.left),
+        )
+        asked = requests(move, bool(self.squat[s]), float(rise), self.config.pace) if verdict == Code.RUNNING else ()
+        self.lay(s, [targets(request, self.config.biped) for request in asked], move.squat)
+        self.stage.expect(s, feet, float(max(move.rise, 0) * rise + step))
+
+    def lay(self, s: int | np.integer, tables: Sequence[Float[np.ndarray, "_ 12"]], squat: bool) -> None:
+        """Put a robot at the beginning of a tape, which ends after a while of standing; an empty one ends at once."""
+        self.squat[s] = squat
+        self.tapes[s] = np.concatenate([*tables, self.stage.rest(squat)])
+        self.place[s] = 0
+        self.length[s] = len(self.tapes[s]) + round(SETTLE / TIMESTEP) if tables else 0
+
+    def write(self, s: int | np.integer, world: WorldState) -> None:
+        """Write down how the mission of a slot ended."""
+        job = self.job[s]
+        worked = np.float32(self.stage.work[s])
+        metrics = zip(self.settings.metrics, world.metrics, strict=True)
+        world = replace(world, metrics=tuple(worked if metric.of_servos else state for metric, state in metrics))
+        last = ending(world, self.goals[self.arena_of[job]])
+        for column, value in zip(jax.tree.leaves(self.result), jax.tree.leaves(last), strict=True):
+            column[job] = value
+
+    def renew(self, ended: Bool[np.ndarray, "S"]) -> None:
+        """Give the slots of a mask the next jobs, or none when there are no more."""
+        self.job[ended] = self.next_job + np.arange(ended.sum())
+        self.next_job += int(ended.sum())
+        begun = fresh(self.arenas, self.settings, self.jobs, jnp.asarray(self.job), self.program)
+        none = no_plan(len(ended))
+        self.world, self.mind, self.plan = choose_rows(ended, (*begun, none), (self.world, self.mind, self.plan))
+        self.enter(ended)
+
+    def enter(self, mask: Bool[np.ndarray, "S"]) -> None:
+        """Stand the robots of a mask at the starts of their arenas."""
+        pose = jax.device_get(self.world.pose)
+        arena = self.arena_of[np.minimum(self.job, len(self.arena_of) - 1)]
+        self.stage.enter(mask, arena, np.stack([pose.x, pose.y, pose.z, pose.yaw], axis=1).astype(float))
+        for s in np.flatnonzero(mask):
+            self.lay(s, [self.stage.rest(False)], False)
+
+    def tell(
+        self, ids, plan: Plan, world: WorldState, moved: AgentState, following: Plan, thought: DecisionTrace
+    ) -> None:
+        """Tell the observer."""
+        for k, s in enumerate(ids):
+            job = int(self.job[s])
+            at = slice(k, k + 1)
+            if plan.some[k]:
+                self.observer.concluded(job, row(world, at), row(moved, at))
+            if world.code[k] == Code.RUNNING:
+                self.observer.decided(job, row(world, at), row(following.command, at), row(thought, at))
+
+
+def row(tree, index):
+    """Row(s) `index` of every leaf."""
+    return jax.tree.map(lambda leaf: leaf[index], tree)

@@ -1,0 +1,218 @@
+"""What simulated bipeds and their referee compute between two movements: judge the one, plan the next. All in JAX."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
+from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.mission.batched_driver import Jobs, begin, pick
+from jaxbiped.mission.decision import DecisionTrace
+from jaxbiped.mission.executors import ODOMETRY, Execution
+from jaxbiped.mission.mission_step import apply_outcome, sense_and_decide
+from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.motion.primitives import Command, Primitive, duration
+from jaxbiped.motion.selection import cell_of
+from jaxbiped.sensing.counter_rng import fold
+from jaxbiped.sensing.odometry import drift
+from jaxbiped.sensing.view import Sightings, View
+
+HINDERED, TWISTED = 0.02, 0.1  # [m, rad] off where a command leads: something was in the way
+PATIENCE = 2  # commands in a row that were hindered before the robot believes its feet
+TOUCH_VOTES = 1e5  # [px] what feet felt outvotes all that was seen
+BACK = 0.04  # [m] of a step backward
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class Plan:
+    """What a robot is at."""
+
+    command: Command
+    verdict: Int[Array, "*B"]
+    some: Bool[Array, "*B"]  # False before the first decision
+    hindered: Int[Array, "*B"]  # commands before this one, in a row, that something was in the way of
+
+
+def no_plan(size: int) -> Plan:
+    """Before the first decision."""
+    zero, whole, no = jnp.zeros(size), jnp.zeros(size, jnp.int32), jnp.zeros(size, bool)
+    return Plan(Command(turn=zero, primitive=whole, length=zero, rise=whole, squat=no, left=zero), whole, no, whole)
+
+
+@jax.jit
+def gather(tree, rows: Int[Array, "n"]):
+    """Rows of every leaf."""
+    return pick(tree, rows)
+
+
+@jax.jit
+def scatter(tree, rows: Int[Array, "n"], values):
+    """Every leaf with some of its rows replaced; rows beyond its length are dropped."""
+    return jax.tree.map(lambda leaf, new: leaf.at[rows].set(new, mode="drop"), tree, values)
+
+
+@jax.jit
+def choose_rows(mask: Bool[Array, "S"], new, old):
+    """Rows of `new` where the mask is on, else of `old`."""
+    return jax.tree.map(lambda a, b: jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b), new, old)
+
+
+@partial(jax.jit, static_argnames=("program",))
+def fresh(
+    arenas: Arena, settings: MissionParams, jobs: Jobs, job: Int[Array, "S"], program: MissionSpec
+) -> tuple[WorldState, AgentState]:
+    """See `batched_driver.begin`."""
+    return begin(arenas, settings, jobs, job, program)
+
+
+@partial(jax.jit, static_argnames=("program",))
+def judge_and_think(
+    world: WorldState,
+    mind: AgentState,
+    plan: Plan,
+    after: Pose,
+    carriage: BodyPose,
+    fell: Bool[Array, "n"],
+    collided: Bool[Array, "n"],
+    arena: Arena,
+    settings: MissionParams,
+    program: MissionSpec,
+) -> tuple[WorldState, AgentState, AgentState, Plan, DecisionTrace]:
+    """The referee looks at what came of each robot's plan, and each robot makes its next one.
+
+    Returns:
+      The world and the mind after what was done; the mind after the next measurement; the next plan; the thought.
+    """
+    world, mind, times = judge(world, mind, plan, after, fell, collided, arena, settings, program)
+    return world, mind, *think_on(world, mind, times, carriage, arena, settings, program)
+
+
+@partial(jax.jit, static_argnames=("program",))
+def judge(
+    world: WorldState,
+    mind: AgentState,
+    plan: Plan,
+    after: Pose,
+    fell: Bool[Array, "n"],
+    collided: Bool[Array, "n"],
+    arena: Arena,
+    settings: MissionParams,
+    program: MissionSpec,
+) -> tuple[WorldState, AgentState, Int[Array, "n"]]:
+    """The referee looks at what came of each robot's plan.
+
+    Deviation: the paper's robot knows nothing but what it sees. Here, feet that were stopped `PATIENCE` times in a row,
+    by an edge that the map has elsewhere, make the robot step back and plan round that cell.
+
+    Returns:
+      The world and the mind after what was done; how many commands in a row something was in the way of.
+    """
+    executed = jax.vmap(carried_out)(world, plan.command, after, fell, collided, arena, settings)
+    done = jax.vmap(apply_outcome, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
+        world, mind, plan.command, plan.verdict, executed, arena, settings, program
+    )
+    times = jnp.where(plan.some & hindered(plan.command, executed.moved), plan.hindered + 1, 0)
+    felt = jax.vmap(feel, in_axes=(0, 0, 0, None))(done[1], mind.belief.pose, plan.command, program.spec)
+    done = done[0], choose_rows(times >= PATIENCE, felt, done[1])
+    return *choose_rows(plan.some, done, (world, mind)), times
+
+
+@partial(jax.jit, static_argnames=("program",))
+def think_on(
+    world: WorldState,
+    mind: AgentState,
+    times: Int[Array, "n"],
+    carriage: BodyPose,
+    arena: Arena,
+    settings: MissionParams,
+    program: MissionSpec,
+    seen: tuple[View, Sightings] | None = None,
+) -> tuple[AgentState, Plan, DecisionTrace]:
+    """Each robot measures, or has `seen`, and makes its next plan; `times` is what `judge` returned.
+
+    Returns:
+      The mind after the measurement; the plan; the thought.
+    """
+    _, thinking, command, verdict, thought = sense_and_decide(world, mind, arena, settings, program, carriage, seen)
+    stuck = times >= PATIENCE
+    command = choose_rows(stuck & (verdict == Code.RUNNING), back_off(command), command)
+    return thinking, Plan(command, verdict, jnp.ones_like(stuck), jnp.where(stuck, 0, times)), thought
+
+
+def hindered(command: Command, moved: Float[Array, "n 3"]) -> Bool[Array, "n"]:
+    """Whether feet were in the way of something low: by odometry [n, 3], the robot is not where its command leads.
+
+    Steps over an edge do not count, and neither does what was hindered while it backed off.
+    """
+    cos, sin = jnp.cos(command.turn), jnp.sin(command.turn)
+    x, y = command.length * cos - command.left * sin, command.length * sin + command.left * cos
+    off = jnp.hypot(moved[:, 0] - x, moved[:, 1] - y)
+    astray = jnp.abs(wrap_angle(moved[:, 2] - command.turn))
+    return ((off > HINDERED) | (astray > TWISTED)) & (command.rise == 0) & (command.length >= 0)
+
+
+def feel(mind: AgentState, before: Pose, command: Command, spec: GridSpec) -> AgentState:
+    """Write an obstacle into the map of one robot, at the cell where feet that were hindered should have come to stand.
+
+    If it stands in that cell, then at the cell behind it.
+    """
+    yaw = before.yaw + command.turn
+    ahead = Pose(before.x, before.y, before.z, yaw)
+    own = cell_of(mind.belief.pose.x, mind.belief.pose.y, spec)
+    there = cell_of(*to_world(ahead, command.length, command.left), spec)
+    beyond = cell_of(*to_world(ahead, command.length + spec.pitch, command.left), spec)
+    i, j = jnp.where(jnp.all(there == own), beyond, there)
+    votes = mind.grid_map.votes.at[i, j, Cell.OBSTACLE - 1].add(TOUCH_VOTES)
+    return replace(mind, grid_map=replace(mind.grid_map, votes=votes))
+
+
+def back_off(command: Command) -> Command:
+    """A step backward instead of what was decided."""
+    zero, whole = jnp.zeros_like(command.length), jnp.zeros_like(command.primitive)
+    return Command(
+        turn=zero,
+        primitive=whole + Primitive.STRAIGHT_FORWARD,
+        length=zero - BACK,
+        rise=whole,
+        squat=command.squat,
+        left=zero,
+    )
+
+
+def carried_out(
+    world: WorldState,
+    command: Command,
+    after: Pose,
+    fell: Bool[Array, ""],
+    collided: Bool[Array, ""],
+    arena: Arena,
+    settings: MissionParams,
+) -> Execution:
+    """What came of a command, from where the engine says that the robot stands after it.
+
+    Odometry counts the true displacement, with the noise of every executor: so much as joints and feet tell of it.
+    Time is Table 2's, distance the true one. Consumes channel ODOMETRY of the mission's seed.
+    """
+    dx, dy = to_robot(world.pose, after.x, after.y)
+    seed = fold(world.seed, ODOMETRY, world.decisions)
+    moved, variances = drift((dx, dy, wrap_angle(after.yaw - world.pose.yaw)), settings.odometry, seed)
+    outside = (after.x < 0) | (after.x > arena.size_xy[0]) | (after.y < 0) | (after.y > arena.size_xy[1])
+    return Execution(
+        pose=after,
+        moved=jnp.stack(moved),
+        variances=variances,
+        time=duration(command, settings.durations),
+        distance=jnp.hypot(dx, dy),
+        collided=collided,
+        fell=fell & ~collided,
+        outside=outside,
+    )

@@ -1,0 +1,27 @@
+"""The static part of missions in arenas of one kind, refused where a component does not know their terrain."""
+
+from __future__ import annotations
+
+from jaxbiped.arenas.ground import WITH_TERRAIN, no_terrain_for
+from jaxbiped.geometry.height_field import HeightField
+from jaxbiped.mission.execution import find_executor
+from jaxbiped.mission.sensors import find_sensor
+from jaxbiped.mission.settings import MissionConfig, MissionSpec, program
+
+
+def program_for(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None) -> MissionSpec:
+    """See `settings.program`.
+
+    Raises:
+      InputError: a pitch that does not divide the size [m]; terrain that the sensor or the executor does not know.
+    """
+    for kind, choice in (("sensor", config.sensor), ("executor", config.executor)):
+        if terrain is not None and not (choice in WITH_TERRAIN[kind] or knows_terrain(kind, choice)):
+            raise no_terrain_for(f"{kind} {choice}")
+    return program(config, size_xy, terrain)
+
+
+def knows_terrain(kind: str, name: str) -> bool:
+    """Whether a sensor or an executor that somebody brought says so."""
+    component = find_sensor(name) if kind == "sensor" else find_executor(name)
+    return component is not None and component.on_terrain

@@ -1,0 +1,41 @@
+"""Everything that the page and its files say, gathered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from jaxbiped.mission.log import MissionLog
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.reproduction.account import Measuring, Record
+from jaxbiped.reproduction.mishaps import Ending
+from jaxbiped.reproduction.savings import Population
+from jaxbiped.reproduction.table_1 import Shown
+from jaxbiped.reproduction.table_2 import Verified
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What was found; parts that were skipped are empty."""
+
+    config: MissionConfig  # of the missions in scenes
+    experiments: Mapping[int, tuple[Record, ...]]  # by their numbers
+    shown: Mapping[int, Record]  # the one of each that tables and pictures show
+    logs: Mapping[int, MissionLog]  # of these
+    shortest: Mapping[int, float | None]  # [m] of the way by Eq. (1) with perfect knowledge of each scene
+    gate_depth: float  # [m] of the lintel of experiment 6, along the way
+    fit: Measuring | None
+    table_1: Mapping[tuple[str, str], Shown] = field(default_factory=dict)  # (strategy, scene)
+    table_2: tuple[Verified, ...] = ()
+    endings: tuple[Ending, ...] = ()
+    populations: tuple[Population, ...] = ()
+
+    @property
+    def default(self) -> float:
+        """[s] of a measurement, as the missions' clocks had it."""
+        return self.config.durations.measure
+
+    @property
+    def measure(self) -> float:
+        """[s] of a measurement: the fitted one, where something could be fitted."""
+        return self.fit.seconds if self.fit else self.default

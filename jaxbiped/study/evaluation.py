@@ -1,0 +1,151 @@
+"""Missions on many arenas: from a study's config to rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import polars as pl
+from jaxtyping import Array, Int, PRNGKeyArray, UInt32
+
+from jaxbiped.arenas.arena import Arena
+from jaxbiped.arenas.population import Population
+from jaxbiped.arenas.source import OwnFamily, draw_arena, name_of
+from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.core.sizes import ARENAS, POINTS, fill_up, filled
+from jaxbiped.devices import by_rows, cores, mesh_of
+from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.batched_driver import OnProgress, Tally
+from jaxbiped.mission.oracle import OraclePlan, oracle_plan
+from jaxbiped.sensing.counter_rng import from_key
+from jaxbiped.statistics.schema import SCHEMA
+from jaxbiped.study.batching import Group, Point, Shard, groups_of, shards
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.metric_values import check_metrics, metric_columns
+from jaxbiped.study.rows import frame
+from jaxbiped.study.runner import batch_driver
+
+NOISE = 1  # fold_in of an arena's key, for the noise of its missions
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a study is: missions of this run, and all that it has to do."""
+
+    ended: int
+    reached: int
+    total: int
+
+
+def evaluate(
+    config: StudyConfig,
+    on_progress: Callable[[Progress], None] | None = None,
+    *,
+    points: Sequence[Point] | None = None,
+    done: Collection[int] = (),
+) -> Iterator[tuple[Shard, pl.DataFrame]]:
+    """Rows of `schema.SCHEMA`, a frame for each shard; memory does not grow with the number of arenas.
+
+    Consumes `jax.random.key(config.seed)`.
+
+    Args:
+      points: sweep points; by default the one of `config`.
+      done: numbers of shards to leave out. What others hold does not depend on them.
+    """
+    groups = groups_of(config, points)
+    left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
+    rows = [groups[shard.group].rows(shard) for shard in left]
+    before, total = Tally(0, 0), sum(rows)
+    for shard in left:
+        last = [before]
+
+        def report(tally: Tally, before: Tally = before, last: list[Tally] = last) -> None:
+            last[0] = before + tally
+            if on_progress:
+                on_progress(Progress(last[0].ended, last[0].reached, total))
+
+        yield shard, compute(config, groups[shard.group], shard, report)
+        before = last[0]
+
+
+@with_own_settings
+def compute(
+    config: StudyConfig,
+    group: Group,
+    shard: Shard,
+    on_progress: OnProgress = lambda tally: None,
+    workers: int | None = None,
+) -> pl.DataFrame:
+    """The rows of one shard: a function of config, group and shard alone, whatever was computed before, and where.
+
+    Args:
+      workers: queues worked off at once, a core each; by default as many as this process may use.
+    """
+    # Shards are filled up with arenas beyond the study, so that all of them, and those of others, share programs.
+    kind, count = group.kind, group.kind.count(shard.first, shard.count)
+    index = kind.indices(shard.first, filled(min(config.shard, config.arenas), ARENAS))
+    if count == 0:
+        return pl.DataFrame(schema={**SCHEMA, **dict.fromkeys(group.metrics, pl.Float64)})
+    size, key = len(index), jax.random.key(config.seed)
+    turns = None if len(kind.places) == kind.number else jnp.asarray(kind.turns(index))
+    batch, seeds = draw(key, jnp.asarray(index), kind.families, group.populations, turns)
+    check_metrics(batch, group, size)
+    with batch_driver(group, workers or cores()) as play:
+        result = play(batch, seeds, group.settings, count, group.static, on_progress, population_of=group.population_of)
+    batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
+    plan = plan_all(batch, group, size)
+    families = [kind.families[turn] for turn in kind.turns(index[:count])]
+    rows = frame(index[:count], batch, group, list(map(name_of, families)), result, plan)
+    return rows.with_columns(**metric_columns(batch, group, result, plan, size))
+
+
+@with_own_settings
+@ready_jit(static_argnames=("families",))
+def draw(
+    key: PRNGKeyArray,
+    index: Int[Array, "A"],
+    families: tuple[str | OwnFamily, ...],
+    populations: Population | None = None,
+    turns: Int[Array, "A"] | None = None,
+) -> tuple[Arena, UInt32[Array, "A"]]:
+    """Arenas `index` of the population, and the seeds of their missions' noise: the same for all strategies.
+
+    Args:
+      populations: leaves [U]; the arenas are then those of each of them, one after the other: [U * A].
+      turns: which of the families each is; by default its number modulo theirs.
+    """
+
+    def one(population: Population | None) -> Arena:
+        if turns is None:
+            return jax.vmap(lambda k: draw_arena(key, k, families, population))(index)
+        return jax.vmap(lambda k, turn: draw_arena(key, k, families, population, turn))(index, turns)
+
+    if populations is None:
+        batch = one(None)
+    else:
+        batch = jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), jax.vmap(one)(populations))
+    seeds = jax.vmap(lambda k: from_key(jax.random.fold_in(jax.random.fold_in(key, k), NOISE)))(index)
+    return batch, seeds
+
+
+@with_own_settings
+def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
+    """The oracle plans of all points [P * S] on the arenas [A] of their populations, all on the host."""
+    kinds = len(group.population_of)
+    out = OraclePlan(np.zeros((kinds, size), bool), *(np.zeros((kinds, size), np.float32) for _ in range(2)))
+    make = partial(oracle_plan, program=group.static)
+    if len(jax.local_devices()) > 1:
+        make = by_rows(oracle_plan, mesh_of(jax.local_devices()), shared=1, axis=1, program=group.static)
+    for population in np.unique(group.population_of):
+        mine = np.flatnonzero(group.population_of == population)
+        arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
+        settings = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.settings)
+        several = POINTS if len(mine) == kinds else 1  # of many populations few have as many points
+        plan = jax.device_get(make(arenas, fill_up(settings, several)))
+        for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(plan), strict=True):
+            rows[mine] = found[: len(mine)]
+    return out

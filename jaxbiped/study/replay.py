@@ -1,0 +1,178 @@
+"""A few missions of a stored study played again, one by one, to be looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import polars as pl
+
+from jaxbiped.arenas.config import PopulationConfig
+from jaxbiped.arenas.source import OwnFamily, find_family
+from jaxbiped.config import parse
+from jaxbiped.core.code_hash import component_hash
+from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
+from jaxbiped.core.registry import FAMILIES
+from jaxbiped.core.registry import SENSORS as SENSORS_OWN
+from jaxbiped.errors import InputError
+from jaxbiped.mission.batched_driver import stack
+from jaxbiped.mission.config import EXECUTORS, SENSORS
+from jaxbiped.mission.recorded_driver import Mission
+from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.strategies import Strategy, find_strategy
+from jaxbiped.statistics.comparison import paired
+from jaxbiped.statistics.schema import KNOWN
+from jaxbiped.statistics.schema import STRATEGIES as BUILT_IN
+from jaxbiped.study.arena_kinds import kinds_of
+from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
+from jaxbiped.study.config import OF_COMPONENTS
+from jaxbiped.study.evaluation import draw
+from jaxbiped.study.manifest import MANIFEST, Manifest
+from jaxbiped.study.runner import check_mission, play_one, seeing
+from jaxbiped.study.sweep import point_at
+
+
+@dataclass(frozen=True)
+class Example:
+    """An arena where two sides differ."""
+
+    arena: int
+    family: str
+    difficulty: float
+    why: str
+
+
+def examples(frame: pl.DataFrame, first: str, second: str, count: int) -> tuple[Example, ...]:
+    """Up to `count` arenas where two sides differ most, the kinds of difference taking turns.
+
+    Kinds: the greatest difference in time where both arrived, whichever was faster; only the first arrived, and only
+    the second. In the last two, the arena where the other walked furthest in vain.
+
+    Args:
+      frame: rows of two names in `strategy`.
+    """
+    sides = [frame.filter(pl.col("strategy") == name) for name in (first, second)]
+    both, solved = paired(*sides)
+    apart = solved.with_columns(gap=pl.col("time") - pl.col("time_second")).filter(pl.col("gap").abs() > 1e-4)
+    apart = apart.sort(pl.col("gap").abs(), "arena", descending=[True, False])
+    lists = [
+        [
+            (arena, f"{second if gap > 0 else first} is faster by {abs(gap) / 60:.1f} min")
+            for arena, gap in zip(apart["arena"][:count], apart["gap"][:count], strict=True)
+        ]
+    ]
+    for winner, loser, lost in ((first, second, sides[1]), (second, first, sides[0])):
+        ahead = pl.col("success") & ~pl.col("success_second")
+        if winner == second:
+            ahead = ~pl.col("success") & pl.col("success_second")
+        rows = lost.join(both.filter(ahead).select("arena"), on="arena", how="semi")
+        rows = rows.sort("walked", "arena", descending=[True, False], nulls_last=True)[:count]
+        codes = [code.replace("_", " ") for code in rows["code"]]
+        said = [f"only {winner} arrives; {loser}: {code}" for code in codes]
+        lists.append(list(zip(rows["arena"], said, strict=True)))
+    turns = [found[k] for k in range(count) for found in lists if k < len(found)]
+    arenas = {row["arena"]: row for row in frame.unique("arena").iter_rows(named=True)}
+    return tuple(
+        Example(arena, arenas[arena]["family"], arenas[arena]["difficulty"], why) for arena, why in turns[:count]
+    )
+
+
+class Origin(NamedTuple):
+    """Where missions come from: a study, one of its sweep points, and a strategy."""
+
+    manifest: Manifest
+    point: int
+    values: dict[str, float]  # of the swept fields at that point, by their dotted names
+    strategy: str
+
+
+def play_again(
+    manifest: Manifest,
+    point: int,
+    values: dict[str, float],
+    strategy: str,
+    arenas: Sequence[int],
+    own: Mapping[str, Strategy] | None = None,
+) -> list[Mission]:
+    """Missions of some arenas, as the study played them, with their logs. Other arguments: see `Origin`.
+
+    Args:
+      own: strategies by their names that are not built in. A results folder never causes an import.
+
+    Raises:
+      InputError: a config that this version does not know, a biped that cannot be simulated here, or a strategy that
+        is not built in and not given, or is not the one of the study.
+    """
+    again = strategy_again(manifest, strategy, own or {})
+    said = manifest.config.get("mission")  # looked at as it is: reading it as a config would import what it names
+    for kind, default, known in ((SENSOR, "raycast", SENSORS), (EXECUTOR, "kinematic", EXECUTORS)):
+        same_component(manifest, kind, str(said.get(kind, default)) if isinstance(said, dict) else default, known)
+    config, families, population = mission_of(manifest, point, values)
+    numbers = manifest.config.get("numbers", {}) | {k: v for k, v in values.items() if k.startswith(OF_COMPONENTS)}
+    populations = None if population == PopulationConfig() else stack([population.traced()])
+    families = families_again(manifest, families)
+    check_mission(config)
+    key, played = jax.random.key(manifest.seed), {}
+    with seeing(config) as eyes:
+        for kind in kinds_of(families):
+            mine = np.array([k for k in arenas if k % kind.number in kind.places], int)
+            if len(mine):
+                batch, seeds = draw(key, jnp.asarray(mine), kind.families, populations, jnp.asarray(kind.turns(mine)))
+                for row, k in enumerate(mine):
+                    arena = jax.tree.map(lambda leaf, row=row: leaf[row], batch)
+                    played[int(k)] = play_one(arena, config, again, seeds[row], eyes=eyes, numbers=numbers)
+    return [played[int(k)] for k in arenas]
+
+
+def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -> Strategy:
+    """A strategy of a study: one that is built in, or that is given again and has the hash that the study tells."""
+    if name in BUILT_IN:
+        return find_strategy(name)
+    if name not in own:
+        message = "is not built in: its missions can be played again only by a program that gives it again"
+        raise InputError(message, field="strategy", value=name)
+    if hash_of(own[name]) != manifest.config.get("components", {}).get(name):
+        raise InputError("has other code or other numbers than in the study", field="strategy", value=name)
+    return own[name]
+
+
+def same_component(manifest: Manifest, kind: str, name: str, built_in: Sequence[str]) -> None:
+    """Raise `InputError` unless a sensor or an executor is built in, or registered and as the study tells."""
+    if name in built_in:
+        return
+    registry = SENSORS_OWN if kind == SENSOR else EXECUTORS_OWN
+    if name not in registry:
+        raise InputError("is not built in: only a program that registers it can play it again", field=kind, value=name)
+    if component_hash(registry.held[name]) != manifest.config.get("components", {}).get(f"{kind} {name}"):
+        raise InputError("has other code or other numbers than in the study", field=kind, value=name)
+
+
+def families_again(manifest: Manifest, names: Sequence[str]) -> tuple[str | OwnFamily, ...]:
+    """The families of a study: those that are built in, and scenes and registered ones that have the hash it tells."""
+    found = []
+    for name in names:
+        if name not in KNOWN and not name.endswith(".toml") and name not in FAMILIES:
+            message = "is not built in: its arenas can be drawn again only by a program that registers it"
+            raise InputError(message, field="families", value=name)
+        found.append(find_family(name))
+        hashes = manifest.config.get("components", {})
+        if not isinstance(found[-1], str) and found[-1].digest() != hashes.get(f"{FAMILY} {found[-1].name}"):
+            raise InputError("is not what it was in the study", field="families", value=name)
+    return tuple(found)
+
+
+def mission_of(
+    manifest: Manifest, point: int, values: dict[str, float]
+) -> tuple[MissionConfig, tuple[str, ...], PopulationConfig]:
+    """The missions of one sweep point, and the families and the population of their arenas."""
+    config = manifest.config
+    if not {"mission", "families"} <= config.keys():
+        raise InputError("the manifest holds no config of missions", file=MANIFEST)
+    mission = parse(MissionConfig, config["mission"], file=MANIFEST)
+    population = parse(PopulationConfig, config.get("population", {}), file=MANIFEST)
+    here = point_at(point, values, mission.model_dump(), population.model_dump())
+    return here.mission, tuple(config["families"]), here.population

@@ -1,0 +1,167 @@
+"""Going on with a study that was stopped: its folder is taken up only where the result will be as if it never was."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from jaxbiped import files
+from jaxbiped.config import Model
+from jaxbiped.errors import InputError
+from jaxbiped.mission.metric import MetricFormat
+from jaxbiped.statistics.schema import validate
+from jaxbiped.study.lock import LOCK, FolderLock
+from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
+from jaxbiped.study.store import POINTS, ROWS, Store, broken_shard, create, shard_number, shard_paths
+
+SHOWN = 6  # differing fields in a message
+ABSENT = "nothing"
+
+
+def resume(
+    folder: str | Path,
+    config: Model,
+    *,
+    seed: int,
+    arenas: int,
+    rows: Sequence[int],
+    points: pl.DataFrame | None = None,
+    device_name: str = "",
+    metrics: Mapping[str, MetricFormat] | None = None,
+) -> Store:
+    """A results folder open for writing what is left; where nothing was begun there, a new one.
+
+    Args:
+      rows: how many rows each shard has, by its number.
+      points, metrics: as for `create`.
+      device_name: of where it will be computed; by default the devices that JAX sees here.
+
+    Raises:
+      InputError: the folder is finished, is being written, holds something else or a damaged shard, or was begun
+        with another config, other versions or on another kind of device; nothing is changed then.
+    """
+    folder = Path(folder)
+    if not begun(folder):
+        made = {"points": points, "device_name": device_name, "metrics": metrics}
+        return create(folder, config, seed=seed, arenas=arenas, **made)
+    manifest = read_manifest(folder)
+    refuse_finished(folder, manifest)
+    refuse_other_config(folder, manifest, config)
+    refuse_other_program(folder, manifest, device_name or device())
+    lock = FolderLock(folder)
+    try:
+        manifest = read_manifest(folder)  # another process may have gone on with it before we had the lock
+        refuse_finished(folder, manifest)
+        check_shards(folder, rows)
+        sweep_up(folder)
+        store = Store(folder, manifest.model_copy(update={"resumed": manifest.resumed + 1}), lock, made=False)
+        store.write_manifest(state="running")
+    except BaseException:
+        lock.release()
+        raise
+    return store
+
+
+def refuse_taken(folder: Path) -> None:
+    """Raise `InputError` when a new study cannot be written there, with what to do about one that was stopped."""
+    if (folder / MANIFEST).exists() and read_manifest(folder).state != "finished":
+        message = "holds a study that is not finished: --resume goes on with it"
+        raise InputError(message, field="out", value=str(folder))
+    files.refuse_existing(folder)
+
+
+def begun(folder: Path) -> bool:
+    """Whether a study wrote its manifest there. What a killed one leaves before that is removed."""
+    if not folder.is_dir() or (folder / MANIFEST).exists():
+        return folder.is_dir()
+    ours = {LOCK, ROWS, POINTS}
+    others = [path for path in folder.iterdir() if path.name not in ours and not is_scrap(path)]
+    if others or any((folder / ROWS).glob("*")):
+        raise InputError(f"is not a results folder; it has no {MANIFEST}", file=folder)
+    lock = FolderLock(folder)
+    try:
+        if not (folder / MANIFEST).exists():
+            sweep_up(folder)
+            (folder / POINTS).unlink(missing_ok=True)
+            if (folder / ROWS).is_dir():
+                (folder / ROWS).rmdir()
+    finally:
+        lock.release()
+    return (folder / MANIFEST).exists()
+
+
+def is_scrap(path: Path) -> bool:
+    """A file that was being written when its writer was killed (`files.write_whole`)."""
+    return path.name.startswith(".") and path.name.endswith(".part")
+
+
+def sweep_up(folder: Path) -> None:
+    """Remove what a killed writer was writing."""
+    for place in (folder, folder / ROWS):
+        files.sweep_up(place)
+
+
+def refuse_finished(folder: Path, manifest: Manifest) -> None:
+    """Raise `InputError` when there is nothing to go on with."""
+    if manifest.state == "finished":
+        message = f"this study is finished: nothing to resume; `jaxbiped report {folder}` shows it"
+        raise InputError(message, file=folder)
+
+
+def refuse_other_config(folder: Path, manifest: Manifest, config: Model) -> None:
+    """Raise `InputError` that shows the fields in which a config differs from that of the folder."""
+    old, new = (dict(leaves(tree)) for tree in (manifest.config, config.model_dump(mode="json")))
+    changes = [
+        f"{name} {old.get(name, ABSENT)} -> {new.get(name, ABSENT)}"
+        for name in dict.fromkeys([*old, *new])
+        if name not in old or name not in new or old[name] != new[name]
+    ]
+    if changes:
+        more = f", and {len(changes) - SHOWN} more" if len(changes) > SHOWN else ""
+        message = f"was begun with another config, and can go on with that one only: {', '.join(changes[:SHOWN])}{more}"
+        raise InputError(message, file=folder)
+
+
+def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted names and values of everything in a config that holds no further table; a list of tables is one."""
+    if isinstance(tree, Mapping) and tree:
+        items = tree.items()
+    elif isinstance(tree, list) and any(isinstance(item, Mapping) for item in tree):
+        items = enumerate(tree)
+    else:
+        yield name, tree
+        return
+    for key, value in items:
+        yield from leaves(value, f"{name}.{key}" if name else str(key))
+
+
+def refuse_other_program(folder: Path, manifest: Manifest, device_name: str) -> None:
+    """Raise `InputError` where rows that were computed now might differ from those that are there."""
+    here = versions()
+    there = {"device": manifest.device.partition(" x ")[2], **manifest.versions}
+    here = {"device": device_name.partition(" x ")[2], **here}
+    changes = [
+        f"{name} {there.get(name, ABSENT)} (here {value})" for name, value in here.items() if there.get(name) != value
+    ]
+    if changes:
+        message = f"was begun with {', '.join(changes)}, and can go on with the same only"
+        raise InputError(message, file=folder / MANIFEST)
+
+
+def check_shards(folder: Path, rows: Sequence[int]) -> None:
+    """Raise `InputError` about the first shard that is not what this study writes."""
+    for path in shard_paths(folder):
+        number = shard_number(path)
+        if number >= len(rows):
+            raise InputError(f"is no shard of this study, which has {len(rows)}", file=path)
+        try:
+            frame = validate(pl.read_parquet(path), file=path)
+        except UNREADABLE as error:
+            problem = error if isinstance(error, InputError) else broken_shard(path, error)
+            raise InputError(f"{problem}; remove this file, and it is computed again") from None
+        if len(frame) != rows[number]:
+            message = f"has {len(frame)} rows, where this study has {rows[number]}; remove it, and it is computed again"
+            raise InputError(message, file=path)

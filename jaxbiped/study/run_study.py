@@ -1,0 +1,114 @@
+"""A study from its config to a results folder, begun or gone on with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import polars as pl
+
+from jaxbiped.mission.metric import format_of
+from jaxbiped.study import store
+from jaxbiped.study.batching import Point, Shard, groups_of, metrics_of, only_point, shards
+from jaxbiped.study.clock import CompileClock
+from jaxbiped.study.components import fingerprinted
+from jaxbiped.study.config import StudyConfig
+from jaxbiped.study.evaluation import Progress, evaluate
+from jaxbiped.study.resumption import resume as take_up
+
+# Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.
+Engine = Callable[..., Iterator[tuple[Shard, pl.DataFrame]]]
+
+
+def never(frame: pl.DataFrame) -> bool:
+    """All arenas are wanted."""
+    return False
+
+
+def conduct(
+    folder: str | Path,
+    config: StudyConfig,
+    *,
+    points: Sequence[Point] | None = None,
+    resume: bool = False,
+    on_progress: Callable[[Progress], None] | None = None,
+    engine: Engine = evaluate,
+    device: str = "",
+    compile_time: Callable[[], float] | None = None,
+    enough: Callable[[pl.DataFrame], bool] = never,
+) -> store.Manifest:
+    """Compute a study and store it, shard by shard. A process that dies loses at most the shard that it was at.
+
+    Args:
+      folder: must not exist or be empty; with `resume`, one where the same study was stopped, or none yet.
+      points: sweep points; by default the one of `config`.
+      device: of the engine, in words; by default that of this process.
+      compile_time: [s] that the engine has spent compiling so far; by default what this process has.
+      enough: is given each shard once, in the order of their numbers, and says whether the study can end there.
+
+    Raises:
+      InputError: a folder that is not so, or a full disk; what was stored stays readable.
+    """
+    clock, config = CompileClock(), fingerprinted(config)
+    compile_time = compile_time or (lambda: clock.seconds)
+    swept = points is not None
+    points = tuple(points) if swept else only_point(config)
+    groups = groups_of(config, points)  # refuses what does not go together before anything is written
+    kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
+    kind["device_name"] = device
+    kind["metrics"] = {name: format_of(metric, name) for name, metric in metrics_of(config).items()}
+    if resume:
+        results = take_up(folder, config, rows=shard_rows(config, points, swept=swept), **kind)
+    else:
+        results = store.create(folder, config, **kind)
+    with results:
+        judge = in_order(enough, parts=1 if swept else len(groups))
+        paths = store.shard_paths(results.folder) if enough is not never else []
+        if not any(judge(store.shard_number(path), pl.read_parquet(path)) for path in paths):
+            for shard, frame in engine(config, on_progress, points=points if swept else None, done=results.done()):
+                results.append(frame, shard.number, compile_time=compile_time())
+                if judge(shard.number, frame):
+                    break
+        return results.finish(compile_time=compile_time())
+
+
+def in_order(enough: Callable[[pl.DataFrame], bool], parts: int = 1) -> Callable[[int, pl.DataFrame], bool]:
+    """`enough` for shards that come in any order, with their numbers: the others wait for the one whose turn it is.
+
+    Which shard ends first depends on what is in it, so that a rule which looked at them as they come would be biased.
+
+    Args:
+      parts: shards that a block of arenas consists of, which are looked at together.
+    """
+    waiting: dict[int, pl.DataFrame] = {}
+    turn = 0
+
+    def judge(number: int, frame: pl.DataFrame) -> bool:
+        nonlocal turn
+        if enough is never:
+            return False
+        waiting[number] = frame
+        while all(turn + part in waiting for part in range(parts)):
+            block = pl.concat([waiting.pop(turn + part) for part in range(parts)])
+            turn += parts
+            if enough(block):
+                return True
+        return False
+
+    return judge
+
+
+def shard_rows(config: StudyConfig, points: Sequence[Point], *, swept: bool = False) -> list[int]:
+    """Rows of each shard, by its number."""
+    groups = groups_of(config, points)
+    return [groups[shard.group].rows(shard) for shard in shards(config, len(groups), swept=swept)]
+
+
+def table(points: Sequence[Point]) -> pl.DataFrame:
+    """Sweep points as they are stored (`store.read_points`)."""
+    names = list(points[0].values)
+    columns = {name: [float(point.values[name]) for point in points] for name in names}
+    return pl.DataFrame(
+        {"point": [point.index for point in points], **columns},
+        schema={"point": pl.Int32, **dict.fromkeys(names, pl.Float64)},
+    )
