@@ -232,12 +232,12 @@ def test_what_memory_holds_is_counted_as_programs_are_compiled(points, strategie
             length *= 2
         while rows < points * strategies:
             rows *= 2
-        lasting = memory.map_bytes(static, workers) + points * memory.POINT + rows * memory.SETTING
-        return lasting + length * workers * memory.ROW
+        lasting = memory_limit.map_bytes(static, workers) + points * memory_limit.POINT + rows * memory_limit.SETTING
+        return lasting + length * workers * memory_limit.ROW
 
     for arenas in (1, 7, 64, 1000, 1024, 1025):
-        monkeypatch.setattr(memory, "memory", lambda: needed(arenas))  # noqa: B023
+        monkeypatch.setattr(memory_limit, "memory", lambda: needed(arenas))  # noqa: B023
         check_memory(static, points, strategies, arenas, workers)
-        monkeypatch.setattr(memory, "memory", lambda: needed(arenas) - 1)  # noqa: B023
+        monkeypatch.setattr(memory_limit, "memory", lambda: needed(arenas) - 1)  # noqa: B023
         with pytest.raises(InputError, match=r"arenas a shard fit in memory|that may be used"):
             check_memory(static, points, strategies, arenas, workers)
