@@ -46,7 +46,7 @@ class Command:
 
 COMMANDS = (
     Command("straight", 0.0, 0.05),
-    Command("oblique", 0.0, 0.05 * np.sqrt(2)),
+    Command("diagonal", 0.0, 0.05 * np.sqrt(2)),
     Command("left 45", np.pi / 4, 0.05 * np.sqrt(2)),
     Command("right 45", -np.pi / 4, 0.05 * np.sqrt(2)),
     Command("left 90", np.pi / 2, 0.05),

@@ -34,7 +34,7 @@ class Plan:
 
     cells_ij: Int[np.ndarray, "n 2"]  # from start to goal
     costs: Float[np.ndarray, "n"]  # spent on the way to each cell
-    length: float  # [cells] 1 straight, sqrt(2) oblique
+    length: float  # [cells] 1 straight, sqrt(2) diagonal
     turns: int  # changes of direction
     seconds: float  # [s] the field and the path, compiled
     compile_seconds: float  # [s] the first time, on top

@@ -22,10 +22,10 @@ from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import Costs, Rules, field
 
-OCTILE = Costs(1.0, 0.0, 0.0, 0.0, 0.0)  # a straight move 1, an oblique one sqrt(2), and nothing else
+OCTILE = Costs(1.0, 0.0, 0.0, 0.0, 0.0)  # a straight move 1, a diagonal one sqrt(2), and nothing else
 CELLS_AT_ONCE = 1 << 21  # of all maps of a chunk; 16 double-width planes of it are 270 MB
 ROUNDING = 1e-6  # of a length, by float32: below 0.005 cells up to 5,000, the least by which octile lengths of
-# one query differ in practice (99 straight moves for 70 oblique ones)
+# one query differ in practice (99 straight moves for 70 diagonal ones)
 LISTED = 10  # queries that differ, printed one by one
 DIFFER = 1  # exit status
 

@@ -86,8 +86,8 @@ def fits(config: TuneConfig, source: str) -> dict[str, Fit]:
     if durations.straight <= 0:
         raise InputError("must be above 0 to fit costs to", field="durations.straight", value=durations.straight)
     return {
-        "straight moves": fit(durations, oblique=False),
-        "straight and oblique": fit(durations),
+        "straight moves": fit(durations, diagonal=False),
+        "straight and diagonal": fit(durations),
         f"the same, {durations.measure:g} s of measuring a move": fit(durations, measuring=True),
     }
 

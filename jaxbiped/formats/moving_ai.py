@@ -40,7 +40,7 @@ HEADER_LINES = 20  # within which the word 'map' stands, after comments and blan
 
 @dataclass(frozen=True)
 class Scenario:
-    """`Q` queries on one map. Lengths are octile: 1 straight, sqrt(2) oblique, corners never cut."""
+    """`Q` queries on one map. Lengths are octile: 1 straight, sqrt(2) diagonal, corners never cut."""
 
     bucket: Int[np.ndarray, "Q"]
     start_ij: Int[np.ndarray, "Q 2"]  # row, column: the file's y, x

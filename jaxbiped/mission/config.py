@@ -135,7 +135,7 @@ class MissionConfig(Model):
     pitch: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.05
     """[m] of the 2D grid, and of the 3D grid in plan (paper, 3.1)."""
     corner_cutting: bool = False
-    """May an oblique move pass one blocked cell?"""
+    """May a diagonal move pass one blocked cell?"""
     planner: Literal["cell", "heading"] = "cell"
     """What is planned: the cell path of least cost by Eq. 1 (the paper's), or the heading path, of the least time over
     cells and headings, turns counted. Of the costs, C4 alone still counts for `heading`."""

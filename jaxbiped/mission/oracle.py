@@ -74,8 +74,8 @@ def oracle_plan(arenas: Arena, settings: MissionParams, program: MissionSpec) ->
         cells = jnp.moveaxis(start_ij[:, None] + jnp.cumsum(steps, axis=1), 1, 0)
         free = way_is_floor(cells, classes)
         # counted, not summed: a sum of many reals depends on the order in which a batch of this size is added up
-        straight, oblique = (jnp.sum((path >= 0) & (path % 2 == odd), axis=1) for odd in (0, 1))
-        length = spec.pitch * (straight + oblique * np.float32(np.sqrt(2)))
+        straight, diagonal = (jnp.sum((path >= 0) & (path % 2 == odd), axis=1) for odd in (0, 1))
+        length = spec.pitch * (straight + diagonal * np.float32(np.sqrt(2)))
         whole = jnp.all(cells[-1] == goal_ij, axis=1)
         return jnp.where(blind & ~free, jnp.inf, cost), jnp.where(whole, length, jnp.nan)
 

@@ -53,7 +53,7 @@ class Durations:
 def duration(command: Command, durations: Durations) -> Float[Array, "*B"]:
     """Time [s] that a command takes (Table 2): turns by angle, straight and gate by length, steps by event.
 
-    A step over a bump carries the robot up to one oblique cell forward; what is longer is walked straight. Steps to
+    A step over a bump carries the robot up to one diagonal cell forward; what is longer is walked straight. Steps to
     the side and backward, which Table 2 does not have, take as long as forward ones.
     """
     cells = jnp.abs(command.length) / CELL

@@ -24,7 +24,7 @@ BASE_PITCH = 0.05  # [m] the pitch that the paper's costs are given for (paper, 
 class Costs:
     """C0 to C4 of the paper's Eq. 1 on its 5 cm pitch; scalars, or one a arena. All traced, none negative."""
 
-    c0: Float[Array, "*B"] | float = 1.0  # distance: a straight move; an oblique one costs sqrt(2) c0
+    c0: Float[Array, "*B"] | float = 1.0  # distance: a straight move; a diagonal one costs sqrt(2) c0
     c1: Float[Array, "*B"] | float = 1.0  # motion: on one level
     c2: Float[Array, "*B"] | float = 5.0  # motion: into, in and out of a gate
     c3: Float[Array, "*B"] | float = 10.0  # motion: one level up or down
@@ -47,7 +47,7 @@ class Costs:
 class Rules:
     """What the robot may do; scalars, or one a arena. All traced."""
 
-    corner_cutting: Bool[Array, "*B"] | bool = False  # oblique moves past one blocked orthogonal neighbour
+    corner_cutting: Bool[Array, "*B"] | bool = False  # diagonal moves past one blocked orthogonal neighbour
     bumps: Bool[Array, "*B"] | bool = True  # step up and down; else bump cells are obstacles
     gates: Bool[Array, "*B"] | bool = True  # squat through; else gate cells are obstacles
 
@@ -71,7 +71,7 @@ def cell_kinds(classes: Int[Array, "*S"], rules: Rules) -> Int8[Array, "*S"]:
 
 def move_kind(here, there, sides, corner_cutting) -> Int8[Array, "*S"]:
     """What a move is. `here`, `there`: (kind, level) of its ends; `sides`: the kinds of the two orthogonal
-    neighbours of an oblique move, None for a straight one."""
+    neighbours of a diagonal move, None for a straight one."""
     (kind_a, level_a), (kind_b, level_b) = here, there
     rise = jnp.abs(level_a.astype(jnp.int16) - level_b.astype(jnp.int16))
     rise = jnp.where(rise == 0, LEVEL, jnp.where(rise == 1, STEP, FORBIDDEN)).astype(jnp.int8)
@@ -83,10 +83,10 @@ def move_kind(here, there, sides, corner_cutting) -> Int8[Array, "*S"]:
     return kind
 
 
-def kind_cost(kind: Int8[Array, "*S"], costs: Costs, oblique: bool) -> Float[Array, "*S"]:
+def kind_cost(kind: Int8[Array, "*S"], costs: Costs, diagonal: bool) -> Float[Array, "*S"]:
     """C_distance + C_motion of a move (paper, Eq. 1); inf where it is forbidden."""
     c0, c1, c2, c3, c4 = (jnp.asarray(c, jnp.float32) for c in (costs.c0, costs.c1, costs.c2, costs.c3, costs.c4))
-    distance = c0 * np.float32(np.sqrt(2)) if oblique else c0
+    distance = c0 * np.float32(np.sqrt(2)) if diagonal else c0
     out = jnp.where(kind == FORBIDDEN, jnp.inf, distance + c4)
     for what, cost in ((STEP, c3), (IN_GATE, c2), (LEVEL, c1)):
         out = jnp.where(kind == what, distance + cost, out)
@@ -94,13 +94,13 @@ def kind_cost(kind: Int8[Array, "*S"], costs: Costs, oblique: bool) -> Float[Arr
 
 
 def tables(costs: Costs, rules: Rules) -> tuple[Int8[Array, "B C"], Float[Array, "B 2 K"], Int8[Array, "B"]]:
-    """Costs and rules [B] as tables: the kind of a cell of each class, the cost of a straight and of an oblique move of
+    """Costs and rules [B] as tables: the kind of a cell of each class, the cost of a straight and of a diagonal move of
     each kind, and whether corners may be cut."""
 
     def each(count):
         return jnp.broadcast_to(jnp.arange(count, dtype=jnp.int8)[:, None], (count, *costs.c0.shape))
 
-    prices = jnp.stack([kind_cost(each(FORBIDDEN + 1), costs, oblique) for oblique in (False, True)])
+    prices = jnp.stack([kind_cost(each(FORBIDDEN + 1), costs, diagonal) for diagonal in (False, True)])
     return cell_kinds(each(len(Cell)), rules).T, jnp.moveaxis(prices, -1, 0), rules.corner_cutting.astype(jnp.int8)
 
 
@@ -145,7 +145,7 @@ def edge_costs(
     Raises:
       InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
 
-    Deviation: the paper says nothing of oblique moves past the corner of an obstacle; `Rules.corner_cutting`.
+    Deviation: the paper says nothing of diagonal moves past the corner of an obstacle; `Rules.corner_cutting`.
     """
     batch, inputs = grid_arguments(classes, levels, costs or Costs(), rules or Rules())
     return unfold(_edge_costs(*inputs), batch)

@@ -28,7 +28,7 @@ class MoveCounts:
     """The moves of a path, by their shape and again by their kind. A path that is not valid has none."""
 
     straight: Int[Array, "*B"]
-    oblique: Int[Array, "*B"]
+    diagonal: Int[Array, "*B"]
     level: Int[Array, "*B"]  # on one level
     gate: Int[Array, "*B"]  # into, in and out of a gate
     step: Int[Array, "*B"]  # one level up or down
@@ -39,7 +39,11 @@ class MoveCounts:
         """How often each cost is paid: the gradient of the path's cost (paper, Eq. 1). Leaves [B], float32."""
         single = jax.tree.map(lambda n: n.astype(jnp.float32), replace(self, valid=None))
         return Costs(
-            single.straight + math.sqrt(2.0) * single.oblique, single.level, single.gate, single.step, single.unmeasured
+            single.straight + math.sqrt(2.0) * single.diagonal,
+            single.level,
+            single.gate,
+            single.step,
+            single.unmeasured,
         )
 
 
@@ -62,13 +66,13 @@ def _move_counts(classes, levels, rules: Rules, cells_ij, directions, valid) -> 
     moves = (directions >= 0) & valid[:, None]
     ij, direction = jnp.where(moves[..., None], cells_ij[:, :-1], 0), jnp.maximum(directions, 0)
     kind = kinds[jnp.arange(len(ij))[:, None], direction, ij[..., 0], ij[..., 1]]
-    kind, oblique = jnp.where(moves, kind, FORBIDDEN), direction % 2 == 1
+    kind, diagonal = jnp.where(moves, kind, FORBIDDEN), direction % 2 == 1
 
     def count(what):
         return jnp.sum(moves & what, axis=1, dtype=jnp.int32)
 
     by_kind = (count(kind == k) for k in (LEVEL, IN_GATE, STEP, UNMEASURED))
-    return MoveCounts(count(~oblique), count(oblique), *by_kind, jnp.asarray(valid))
+    return MoveCounts(count(~diagonal), count(diagonal), *by_kind, jnp.asarray(valid))
 
 
 def path_cost(

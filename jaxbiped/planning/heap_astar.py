@@ -28,7 +28,7 @@ def astar(edge_costs: Any, start_ij: Any, goal_ij: Any, heading: int = -1) -> AS
     all cells of equally good paths are settled; the path is then read with the tie rule of `path.pick`:
     the present heading (`heading` before the first move) if it is among the best, else the first in the
     order of `DIRECTIONS`. The heuristic is the octile distance at the least cost of a straight and of an
-    oblique move; it never overrates, since two moves of one kind may do the work of the other.
+    diagonal move; it never overrates, since two moves of one kind may do the work of the other.
 
     Raises:
       InputError: an argument of another rank, shape or dtype, a cost that is negative or NaN, or no direction.
@@ -48,12 +48,12 @@ def astar(edge_costs: Any, start_ij: Any, goal_ij: Any, heading: int = -1) -> AS
     nowhere = AStarPath(np.zeros((0, 2), int), np.inf)
     if not all(0 <= i < height and 0 <= j < width for i, j in (start, goal)):
         return nowhere
-    straight, oblique = (np.min(e, where=np.isfinite(e), initial=np.inf) for e in (edges[::2], edges[1::2]))
-    straight, oblique = min(straight, oblique), min(oblique, 2 * straight)
+    straight, diagonal = (np.min(e, where=np.isfinite(e), initial=np.inf) for e in (edges[::2], edges[1::2]))
+    straight, diagonal = min(straight, diagonal), min(diagonal, 2 * straight)
 
     def heuristic(cell):
         short, far = sorted((abs(cell[0] - start[0]), abs(cell[1] - start[1])))
-        return (oblique * short if short else 0.0) + (straight * (far - short) if far > short else 0.0)
+        return (diagonal * short if short else 0.0) + (straight * (far - short) if far > short else 0.0)
 
     cost, settled = {goal: 0.0}, {}
     heap = [(heuristic(goal), goal)]

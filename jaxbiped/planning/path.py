@@ -195,7 +195,7 @@ def _next_step(classes, levels, costs, rules, field_cost, ij, heading, length: i
         levels_near, here = cell(levels, around, 0).T, (kinds[8], cell(levels, ij[:, None], 0)[:, 0])
         moves = []
         for k in range(8):
-            # the orthogonal neighbours of an oblique direction are the directions next to it
+            # the orthogonal neighbours of a diagonal direction are the directions next to it
             sides = (kinds[k - 1], kinds[(k + 1) % 8]) if k % 2 else None
             kind = move_kind(here, (kinds[k], levels_near[k]), sides, rules.corner_cutting)
             moves.append(kind_cost(kind, costs, sides is not None))

@@ -16,9 +16,9 @@ from jaxbiped.motion.grid_units import CELL, EIGHTH
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.reproduction.paper import Experiment
 
-STRAIGHT, OBLIQUE, ASIDE = "straight", "oblique", "aside and back"
+STRAIGHT, DIAGONAL, ASIDE = "straight", "diagonal", "aside and back"
 UP, DOWN, GATE, TURN, MEASURE = "step up", "step down", "gate", "turn", "measure"
-KINDS = (STRAIGHT, OBLIQUE, ASIDE, UP, DOWN, GATE, TURN, MEASURE)
+KINDS = (STRAIGHT, DIAGONAL, ASIDE, UP, DOWN, GATE, TURN, MEASURE)
 GATE_CARRIES = PAPER["gate"].forward  # [m] that the simulated primitive carries the robot
 SMALL = 1e-3  # [s] by which sums of single precision may be off
 PLAYED_AS = {
@@ -106,7 +106,7 @@ def walked(heading: float, length: float) -> str:
     if length <= 0:
         return ASIDE
     off = abs((heading + math.pi / 4) % (math.pi / 2) - math.pi / 4)
-    return OBLIQUE if off > math.pi / 8 else STRAIGHT
+    return DIAGONAL if off > math.pi / 8 else STRAIGHT
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from jaxbiped.motion.grid_units import CELL
 from jaxbiped.report.words import signed
 from jaxbiped.reproduction.account import (
     ASIDE,
+    DIAGONAL,
     DOWN,
     GATE,
     GATE_CARRIES,
-    OBLIQUE,
     STRAIGHT,
     TURN,
     UP,
@@ -68,8 +68,8 @@ def time_reason(item: Experiment, record: Record, measure: float, gate_depth: fl
 def parts_beyond(item: Experiment, record: Record, measure: float) -> list[tuple[float, str]]:
     """Each kind of action minus what Table 2 has for it: [s], and its name."""
     table, parts = expected(item, measure), record.parts
-    floor, edges = parts[STRAIGHT] + parts[OBLIQUE], parts[UP] + parts[DOWN]
-    walked = f"{100 * floor.metres:.0f} cm, {parts[OBLIQUE].count} of {floor.count} moves oblique"
+    floor, edges = parts[STRAIGHT] + parts[DIAGONAL], parts[UP] + parts[DOWN]
+    walked = f"{100 * floor.metres:.0f} cm, {parts[DIAGONAL].count} of {floor.count} moves diagonal"
     return [
         (floor.seconds - table.straight, f"walking on floor and bumps ({walked})"),
         (edges.seconds - table.edges, f"over edges ({edges.count}, of 10 cm each)"),

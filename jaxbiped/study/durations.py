@@ -23,7 +23,7 @@ KINDS = {  # primitive: which of C1 to C3 its move pays, and how it climbs
     Primitive.STEP_UP_BUMP: (3, 1),
     Primitive.STEP_DOWN_BUMP: (3, -1),
 }
-OBLIQUE = (1.0, math.sqrt(2.0))  # straight and oblique moves, in cells
+DIAGONAL = (1.0, math.sqrt(2.0))  # straight and diagonal moves, in cells
 ROUNDING = 1e-9  # of the longest move; how a solution of nothing is rounded depends on the processor
 
 
@@ -61,15 +61,15 @@ def table_2(library: LibraryConfig) -> DurationConfig:
     )
 
 
-def fit(durations: DurationConfig, *, oblique: bool = True, measuring: bool = False) -> Fit:
+def fit(durations: DurationConfig, *, diagonal: bool = True, measuring: bool = False) -> Fit:
     """Least squares of what moves take [s] against what they cost (paper, Eq. 1).
 
     The moves are those of the grid: on the floor, in a gate, one step up, one step down; each straight and, with
-    `oblique`, oblique. Costs are not negative. C4 cannot come from durations: an unmeasured cell takes a further
+    `diagonal`, diagonal. Costs are not negative. C4 cannot come from durations: an unmeasured cell takes a further
     measurement, and whatever turns out to be there.
 
     Args:
-      oblique: without, only the sums C0 + C1, C0 + C2 and C0 + C3 are determined; C1 is then C0, as in the paper.
+      diagonal: without, only the sums C0 + C1, C0 + C2 and C0 + C3 are determined; C1 is then C0, as in the paper.
       measuring: a move takes the measurement that follows it, too.
 
     Raises:
@@ -77,7 +77,7 @@ def fit(durations: DurationConfig, *, oblique: bool = True, measuring: bool = Fa
     """
     features, seconds, names = [], [], []
     for primitive, (paid, rise) in KINDS.items():
-        for length in OBLIQUE if oblique else OBLIQUE[:1]:
+        for length in DIAGONAL if diagonal else DIAGONAL[:1]:
             row = np.zeros(4)
             row[0] = length
             row[paid] = 1.0
@@ -91,9 +91,9 @@ def fit(durations: DurationConfig, *, oblique: bool = True, measuring: bool = Fa
             spent = float(duration(command, jax.tree.map(lambda leaf: leaf[None], durations.traced()))[0])
             features.append(row)
             seconds.append(spent + measuring * durations.measure)
-            names.append(f"{primitive.name.lower()}{'' if length == 1 else ' oblique'}")
+            names.append(f"{primitive.name.lower()}{'' if length == 1 else ' diagonal'}")
     design, measured = np.array(features), np.array(seconds)
-    if oblique:
+    if diagonal:
         found, _ = nnls(design, measured)
     else:
         merged = np.column_stack([design[:, 0] + design[:, 1], design[:, 2:]])

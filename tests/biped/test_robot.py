@@ -19,7 +19,7 @@ from jaxbiped.motion.config import RobotConfig
 ROBOT = RobotModelConfig()
 PAPER = {  # Table 2's durations
     "straight": ask.straight(0.05),
-    "oblique": ask.straight(math.sqrt(2) * 0.05),
+    "diagonal": ask.straight(math.sqrt(2) * 0.05),
     "turn": ask.turn(math.pi / 4),
     "step up": ask.step(0.10, 0.03),
     "step down": ask.step(0.10, -0.03),

@@ -157,7 +157,7 @@ def test_footprint():
     mark = jax.jit(mark_footprint, static_argnames="spec")
     classes, levels = READ(mark(empty(SPEC), 0.525, 0.525, 0.03, 0.06, SPEC), PARAMS, spec=SPEC)
     expected = np.zeros(SPEC.shape)
-    expected[10, 9:12] = expected[9:12, 10] = Cell.BUMP  # 5 cm to the next centre, 7 cm to the oblique one
+    expected[10, 9:12] = expected[9:12, 10] = Cell.BUMP  # 5 cm to the next centre, 7 cm to the diagonal one
     np.testing.assert_array_equal(classes, expected)
     np.testing.assert_array_equal(levels, expected > 0)
     classes, _ = READ(mark(empty(SPEC), 0.51, 0.54, 0.0, 0.0, SPEC), PARAMS, spec=SPEC)

@@ -11,13 +11,13 @@ from jaxbiped.motion.primitives import Command, Primitive, duration
 
 TABLE_2 = {  # command: (turn [deg], primitive, length [m], rise), seconds
     "straight": ((0, Primitive.STRAIGHT_FORWARD, 0.05, 0), 16),
-    "oblique": ((0, Primitive.STRAIGHT_FORWARD, 0.05 * 2**0.5, 0), 16 * 2**0.5),
+    "diagonal": ((0, Primitive.STRAIGHT_FORWARD, 0.05 * 2**0.5, 0), 16 * 2**0.5),
     "turn": ((45, Primitive.NONE, 0, 0), 5),
     "turn right": ((-45, Primitive.NONE, 0, 0), 5),
     "turn round": ((180, Primitive.NONE, 0, 0), 20),
     "step up": ((0, Primitive.STEP_UP_BUMP, 0.05, 1), 96),
     "step down": ((0, Primitive.STEP_DOWN_BUMP, 0.05, -1), 96),
-    "oblique step up": ((0, Primitive.STEP_UP_BUMP, 0.07, 1), 96),
+    "diagonal step up": ((0, Primitive.STEP_UP_BUMP, 0.07, 1), 96),
     "long step up": ((0, Primitive.STEP_UP_BUMP, 0.05 * 2**0.5 + 0.05, 1), 96 + 16),
     "gate": ((0, Primitive.PASS_GATE, 0.05, 0), 48),
     "look": ((45, Primitive.LOOK, 0, 0), 5),

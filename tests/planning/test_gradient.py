@@ -95,7 +95,7 @@ def test_scalar_costs_add_up_the_arenas_and_euler(maps):
 
 
 def test_counts_of_a_path_by_hand():
-    """Floor, gate, floor, up, down, unmeasured, in a row one cell wide; then an oblique move."""
+    """Floor, gate, floor, up, down, unmeasured, in a row one cell wide; then a diagonal move."""
     row = [Cell.FLOOR, Cell.GATE, Cell.FLOOR, Cell.BUMP, Cell.FLOOR, Cell.FLOOR, Cell.UNMEASURED, Cell.FLOOR]
     classes = np.full((B, H, W), Cell.OBSTACLE, np.int8)
     classes[:, 0, :8], classes[:, 0, 8], classes[:, 1, 7:] = row, Cell.FLOOR, Cell.FLOOR

@@ -52,7 +52,7 @@ def test_path_costs_what_the_field_says(planned):
 
 def test_ties_keep_the_heading_then_the_order_of_directions():
     free = np.full((3, 7, 7), Cell.FLOOR, np.int8)
-    goal_ij, start_ij = np.full((3, 2), [6, 3]), np.full((3, 2), [0, 1])  # two oblique moves among six
+    goal_ij, start_ij = np.full((3, 2), [6, 3]), np.full((3, 2), [0, 1])  # two diagonal moves among six
     heading = np.array([2, 1, -1])
     edges = planning.edge_costs(free, 0 * free)
     field = planning.field(free, 0 * free, goal_ij=goal_ij)

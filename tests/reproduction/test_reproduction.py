@@ -60,7 +60,7 @@ def test_parts_sum_to_the_mission():
     found = parts(mission, DURATIONS)
     assert sum(part.seconds for part in found.values()) == pytest.approx(mission.time)
     assert {kind: part.count for kind, part in found.items() if part.count} == {
-        "straight": 1, "oblique": 1, "aside and back": 2, "step up": 1, "gate": 1, "turn": 2, "measure": 7,
+        "straight": 1, "diagonal": 1, "aside and back": 2, "step up": 1, "gate": 1, "turn": 2, "measure": 7,
     }  # fmt: skip
     assert found["gate"].seconds == pytest.approx(48) and found["turn"].seconds == pytest.approx(15)
     made = record(EXPERIMENTS[4], "full", 3, mission, DURATIONS)
@@ -68,7 +68,7 @@ def test_parts_sum_to_the_mission():
 
 
 @pytest.mark.parametrize(
-    ("degrees", "kind"), [(0, "straight"), (89, "straight"), (-170, "straight"), (45, "oblique"), (-140, "oblique")]
+    ("degrees", "kind"), [(0, "straight"), (89, "straight"), (-170, "straight"), (45, "diagonal"), (-140, "diagonal")]
 )
 def test_kind_of_walk(degrees, kind):
     assert walked(np.radians(degrees), 0.05) == kind

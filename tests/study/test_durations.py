@@ -13,7 +13,7 @@ ROOT = np.sqrt(2)
 
 def test_table_2_gives_the_papers_costs_back():
     """8 s a unit. A step of 96 s is 12 units, which leaves 11 for C3; the paper took 10."""
-    found = fit(DurationConfig(), oblique=False)
+    found = fit(DurationConfig(), diagonal=False)
     np.testing.assert_allclose(found.costs, [1, 1, 5, 11], rtol=1e-9)
     assert found.seconds == pytest.approx(8) and np.allclose(found.costs[:3], PAPER[:3])
     np.testing.assert_allclose(found.fitted, found.measured)
@@ -33,7 +33,7 @@ def test_oblique_moves_by_the_normal_equations():
 
 def test_costs_do_not_depend_on_the_unit_of_time_and_are_never_negative():
     slow = DurationConfig(straight=48, turn=15, step_up=288, step_down=288, pass_gate=144, measure=30)
-    for options in ({}, {"oblique": False}, {"measuring": True}):
+    for options in ({}, {"diagonal": False}, {"measuring": True}):
         ours, theirs = fit(DurationConfig(), **options), fit(slow, **options)
         np.testing.assert_allclose(theirs.costs, ours.costs, rtol=1e-5, atol=1e-6)
         assert theirs.seconds == pytest.approx(3 * ours.seconds) and ours.costs.min() >= 0
@@ -43,7 +43,7 @@ def test_costs_do_not_depend_on_the_unit_of_time_and_are_never_negative():
 
 def test_floor_that_takes_no_time():
     with pytest.raises(ValueError, match="must take time"):
-        fit(DurationConfig(straight=0), oblique=False)
+        fit(DurationConfig(straight=0), diagonal=False)
 
 
 def test_measured_primitives_in_the_units_of_table_2():
@@ -51,7 +51,7 @@ def test_measured_primitives_in_the_units_of_table_2():
     found = table_2(library)
     entry = library.primitives
     assert found.straight == entry["straight"].duration  # of 5 cm
-    # ten centimetres: what a step and an oblique cell do not cover is walked
+    # ten centimetres: what a step and a diagonal cell do not cover is walked
     assert found.step_up == pytest.approx(entry["step_up"].duration - (2 - ROOT) * found.straight)
     assert found.pass_gate == pytest.approx(entry["gate"].duration / 3)
     assert found.turn == pytest.approx(entry["turn"].duration, rel=1e-5)

@@ -41,7 +41,7 @@ class PlanArgs(Options):
     c4: Cost = PAPER.c4
     """Cost of what is unmeasured, for 5 cm."""
     corner_cutting: bool = False
-    """Allow oblique moves past one blocked cell."""
+    """Allow diagonal moves past one blocked cell."""
     radius: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """[m] Grow obstacles by this much, for a disc of a robot on a map of plain occupancy."""
     robot: Name = None

@@ -77,7 +77,7 @@ def make_solver(sweeps=line_sweep.sweeps):
 
     `solve_all(classes, levels, kinds_of, prices, cutting, goals, field, steps, settled, cost, room, bytes, height,
     width)`, all flat arrays but goals. Given for B >= LANES arenas: classes and levels of cells, int8 [B, H, W]; the
-    kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and oblique, float32 [B, 2,
+    kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and diagonal, float32 [B, 2,
     KINDS]; whether corners may be cut, int8 [B]; goals int32 [B, 2]. Written: the cost to go, float32 [B, H, W];
     passes, int32 [B]; whether one more relaxation lowers nothing, bool [B]. Room to work in: float64 [size], float32
     [4 * size], int8 [3 * size], with size = `room_size(height, width)`.
@@ -89,7 +89,7 @@ def make_solver(sweeps=line_sweep.sweeps):
     solve_lanes, unsettled = sweeps(lanes), line_sweep.proof(lanes)
     spread, gather = turning(lanes)
     kind_of = translation(lanes, CLASSES, Cell.OBSTACLE)
-    straight, oblique = pricing(lanes, oblique=False), pricing(lanes, oblique=True)
+    straight, diagonal = pricing(lanes, diagonal=False), pricing(lanes, diagonal=True)
 
     @njit(nogil=True)
     def solve_all(
@@ -120,9 +120,9 @@ def make_solver(sweeps=line_sweep.sweeps):
             for n in range(0, ends, lanes):
                 below, right, left = n + line, n + lanes, max(n - lanes, 0)
                 straight(edges[0], n, kind, level, n, right, n, n, price, cut)
-                oblique(edges[1], n, kind, level, n, below + lanes, below, right, slant, cut)
+                diagonal(edges[1], n, kind, level, n, below + lanes, below, right, slant, cut)
                 straight(edges[2], n, kind, level, n, below, n, n, price, cut)
-                oblique(edges[3], n, kind, level, n, below - lanes, below, left, slant, cut)
+                diagonal(edges[3], n, kind, level, n, below - lanes, below, left, slant, cut)
             cost[:] = np.inf
             for lane in range(lanes):
                 i, j = goals[first + lane]

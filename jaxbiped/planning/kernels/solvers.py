@@ -119,7 +119,7 @@ def solve_grids(tables, classes, levels, goal_ij):
 
     Args:
       tables: of each arena: the kind of a cell of each class, int8 [B, 5]; what moves of each kind cost, straight and
-        oblique, float32 [B, 2, KINDS], none NaN or negative; whether corners may be cut, int8 [B].
+        diagonal, float32 [B, 2, KINDS], none NaN or negative; whether corners may be cut, int8 [B].
       classes, levels: int8 [B, H, W]; a cell of no class is an obstacle.
     """
     name, lanes = target(GRIDS)

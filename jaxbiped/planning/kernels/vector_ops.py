@@ -94,12 +94,12 @@ def translation(lanes: int, size: int, default: int):
     return translate
 
 
-def pricing(lanes: int, oblique: bool):
+def pricing(lanes: int, diagonal: bool):
     """The instruction `price(edges, edge, kinds, levels, here, there, side, other, prices, cutting)`.
 
     `edges[edge:]` becomes what a move from `here` to `there` costs, by the rules of `costs.move_kind`, of which this is
     the same in other words. `kinds` and `levels` are of cells, `side` and `other` are the orthogonal neighbours of an
-    oblique move. `prices[k * lanes :]` is the cost of a move of kind k, `cutting` is not 0 where corners may be cut.
+    diagonal move. `prices[k * lanes :]` is the cost of a move of kind k, `cutting` is not 0 where corners may be cut.
     """
 
     @intrinsic
@@ -124,7 +124,7 @@ def pricing(lanes: int, oblique: bool):
             ends = largest(a, b)
             kind = largest(ends, builder.select(equal(rise, 0), vectors.all(0), step))
             kind = builder.select(equal(ends, UNMEASURED), ends, kind)
-            if oblique:
+            if diagonal:
                 one, two = (equal(load(2, arguments[k]), FORBIDDEN) for k in (6, 7))
                 careful = equal(load(9, ir.Constant(WORD, 0)), 0)
                 blocked = builder.or_(builder.and_(one, two), builder.and_(builder.or_(one, two), careful))
