@@ -23,7 +23,7 @@ KINDS = {  # primitive: which of C1 to C3 its move pays, and how it climbs
     Primitive.STEP_UP_BUMP: (3, 1),
     Primitive.STEP_DOWN_BUMP: (3, -1),
 }
-DIAGONAL = (1.0, math.sqrt(2.0))  # straight and diagonal moves, in cells
+LENGTHS = (1.0, math.sqrt(2.0))  # straight and diagonal moves, in cells
 ROUNDING = 1e-9  # of the longest move; how a solution of nothing is rounded depends on the processor
 
 
@@ -77,7 +77,7 @@ def fit(durations: DurationConfig, *, diagonal: bool = True, measuring: bool = F
     """
     features, seconds, names = [], [], []
     for primitive, (paid, rise) in KINDS.items():
-        for length in DIAGONAL if diagonal else DIAGONAL[:1]:
+        for length in LENGTHS if diagonal else LENGTHS[:1]:
             row = np.zeros(4)
             row[0] = length
             row[paid] = 1.0
