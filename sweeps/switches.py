@@ -3,12 +3,12 @@
     python sweeps/switches.py heading [--arenas N] [--executor sampled]           (planning over cells and headings)
     python sweeps/switches.py foot-placement [--arenas N] [--executor native]     (feet placed by measured edges)
 
-Off foot placement, ask `native`: what `sampled` draws from was measured of steps that are placed about right, and it
-makes robots fall that simulated ones save by stopping at an edge and stepping back (`mission.simulated_step`).
+For foot placement use `native`: `sampled` draws from what was measured of steps that are placed about right, so robots
+that place them badly fall more often than simulated ones, which stop at an edge and step back.
 
-Prints how the missions ended, and the paired differences with their intervals, over all arenas and by family: the
-switch on, less off. `jaxbiped compare --planner heading`, or `--foot-placement False`, keeps such missions in a folder,
-and `jaxbiped compare FOLDER FOLDER` compares two.
+Prints how the missions ended, and the paired differences with their intervals, over all arenas and by family: with the
+switch minus without. `jaxbiped compare --planner heading`, or `--foot-placement False`, keeps such missions in a
+folder, and `jaxbiped compare FOLDER FOLDER` compares two.
 """
 
 from __future__ import annotations
