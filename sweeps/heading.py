@@ -99,7 +99,7 @@ def bound(arenas: int, seed: int, strategy: str, console: Console) -> None:
     best, taken = np.concatenate(best)[:arenas], np.concatenate(taken)[:arenas]
     family = np.array(FAMILIES)[np.arange(arenas) % len(FAMILIES)]
     columns = "costs", "family", "arenas", "best", "lost, mean", "median", "95 % of arenas", "worst", "none lost"
-    table = Table(*columns, title=f"Time (s) of the way of Eq. 1 less the best way's, {strategy}, seed {seed}")
+    table = Table(*columns, title=f"Time (s) of the way of Eq. 1 minus the best way's, {strategy}, seed {seed}")
     for number, name in enumerate(costs):
         for kind in ("all", *FAMILIES):
             chosen = np.isfinite(best) & ((family == kind) | (kind == "all"))

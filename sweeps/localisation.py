@@ -81,7 +81,7 @@ def main(
     if scenes_only:
         batch, seeds, arenas = scenes()
     what = f"{arenas} {'scenes' if scenes_only else 'random arenas'}, strategy {strategy}"
-    columns = "localisation", "reached", "less landmarks", "p", "off at the goal", "95 %", "of yaw", "95 %"
+    columns = "localisation", "reached", "minus landmarks", "p", "error at the goal", "95 %", "of yaw", "95 %"
     table = Table(*columns, title=f"{what}, executor {executor}, sensor {sensor}, preset {preset}")
     reached = {}
     for way, times in [(way, 1.0) for way in ways] + [("visual", times) for times in worse]:
