@@ -160,7 +160,7 @@ def command_line() -> str:
 
 
 def legible(text: str) -> str:
-    """The name of a file as text: bytes of it that are none become question marks."""
+    """The name of a file as text; bytes that are not valid text become question marks."""
     return text.encode("utf-8", "replace").decode()
 
 

@@ -27,7 +27,7 @@ def evaluate(
 
     Args:
       out: folder to store the rows in, shard by shard; by default they are kept in memory alone (see `Results.save`).
-        A study that was stopped there is gone on with.
+        A study that was stopped there is resumed.
       on_progress: called now and then.
 
     Raises:

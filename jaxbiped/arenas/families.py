@@ -62,7 +62,7 @@ def sample(
       turn: which of the families it is; by default `index` modulo their number.
 
     Raises:
-      InputError: a key that is none, an index below 0, no family, or one that is not known.
+      InputError: something that is not a key, an index below 0, no family, or an unknown one.
     """
     checks.integers("index", index, between=(0, np.iinfo(np.int32).max))
     unknown = [name for name in families if name not in LAYOUTS]

@@ -121,7 +121,7 @@ def classify(
       area: (least x, greatest x, least y, greatest y) [m] in place of all that the heights cover.
 
     Raises:
-      InputError: an area that is none, too many cells.
+      InputError: an empty area, or too many cells.
     """
     (rows, columns), origin_xy = lay_out(elevation, pitch, area)
     spec = GridSpec(

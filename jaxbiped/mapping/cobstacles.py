@@ -75,7 +75,7 @@ def occupied_levels(evidence: Float[Array, "H W Z"], params: MapParams, spec: Gr
 def solid_levels(
     columns: UInt32[Array, "H W"], evidence: Float[Array, "H W Z"], params: MapParams, spec: GridSpec
 ) -> UInt32[Array, "H W"]:
-    """Those of the occupied levels (`columns`) that are no phantoms.
+    """The occupied levels (of `columns`) that are not phantoms.
 
     A stereo matcher's phantoms are single clumps of few pixels. So a solid voxel has `params.solid_points` within the
     patch of about 5 x 5 cm around it (at least its own cell) and another such voxel among its 26 neighbours. And at an

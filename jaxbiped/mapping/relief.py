@@ -100,7 +100,7 @@ def read_relief(
     there.
 
     Args:
-      columns: masks of the occupied levels; `solid` of those that are no phantoms.
+      columns: masks of the occupied levels; `solid`: of those that are not phantoms.
     """
     many, rise = jnp.maximum(patch_sum(surfaces.weight, spec), 1e-6), patch_sum(surfaces.rise, spec)
     levels = range(spec.ground_levels)

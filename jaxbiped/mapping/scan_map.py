@@ -52,7 +52,7 @@ def lay_out(
       area: (least x, greatest x, least y, greatest y) [m] in place of what the points cover.
 
     Raises:
-      InputError: no point is that near to the floor; an area that is none, or of too many cells.
+      InputError: no point is that near to the floor; an empty area, or one of too many cells.
     """
     if area is None:
         low = np.array([np.inf, np.inf])

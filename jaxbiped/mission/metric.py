@@ -97,7 +97,7 @@ def format_of(metric: Metric, name: str) -> MetricFormat:
     """How the numbers of a metric are shown.
 
     Raises:
-      InputError: a unit, scale or number of digits that is none.
+      InputError: a unit, scale or number of digits that is not valid.
     """
     return parse(
         MetricFormat, {field: getattr(metric, field) for field in MetricFormat.model_fields}, file=f"metric {name}"

@@ -38,7 +38,7 @@ class Strategy:
     """A name, a planner, and what the robot dares.
 
     Raises:
-      InputError: a name that cannot be shown everywhere; a planner that is none, or no pytree.
+      InputError: a name that cannot be shown everywhere; something that is not a planner, or not a pytree.
     """
 
     name: str

@@ -206,7 +206,7 @@ def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> 
         raise ValueError("its way leaves the map")
     steps = np.diff(whole, axis=0)
     if (np.abs(steps).max(1, initial=0) != 1).any():
-        raise ValueError("its way has cells that are no neighbours of those before them")
+        raise ValueError("its path has cells that do not neighbour the cell before them")
     solid, cost, moves = classes == Cell.OBSTACLE, 0.0, np.zeros(len(steps), np.int8)
     for n, ((i, j), (di, dj)) in enumerate(zip(whole[:-1].tolist(), steps.tolist(), strict=True)):
         p, q = i + di, j + dj

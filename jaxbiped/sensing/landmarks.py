@@ -58,7 +58,7 @@ def sight(
     circle.
 
     Raises:
-      InputError: an argument of another rank, shape or type, a kind that is none, a camera that `check_camera` refuses,
+      InputError: an argument of another rank, shape or type, an unknown kind, a camera that `check_camera` refuses,
         NaN in `noise`.
     """
     check_camera(camera)

@@ -40,7 +40,7 @@ def equivalences(
       margins: measure to margin [fraction], [m] or [s]; above 0, and for success below 1.
 
     Raises:
-      InputError: a margin that is none.
+      InputError: a margin that is not a positive number.
     """
     for measure, margin in margins.items():
         if measure not in MEASURES:

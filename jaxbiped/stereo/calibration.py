@@ -27,7 +27,7 @@ class StereoCamera:
     """A rectified pair. Pixel (0, 0) has its centre at (0, 0). Camera frame: x right, y down, z ahead, left camera.
 
     Raises:
-      InputError: a number that is not finite, no focal length or baseline above 0, or a size that is none.
+      InputError: a number that is not finite, no focal length or baseline above 0, or a size that is not positive.
     """
 
     focal: float  # [px]

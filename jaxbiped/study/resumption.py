@@ -53,7 +53,7 @@ def resume(
     refuse_other_program(folder, manifest, device_name or device())
     lock = FolderLock(folder)
     try:
-        manifest = read_manifest(folder)  # another process may have gone on with it before we had the lock
+        manifest = read_manifest(folder)  # another process may have resumed it before we had the lock
         refuse_finished(folder, manifest)
         check_shards(folder, rows)
         sweep_up(folder)

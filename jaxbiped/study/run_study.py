@@ -1,4 +1,4 @@
-"""A study from its config to a results folder, begun or gone on with."""
+"""Runs a study from its config into a results folder, from the start or from where it was stopped."""
 
 from __future__ import annotations
 

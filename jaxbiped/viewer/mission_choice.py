@@ -85,7 +85,7 @@ class Study:
         return f"{row['point']}: {said}" if said else "0"
 
     def rows(self, strategy: str, point: int) -> pl.DataFrame:
-        """Rows of one strategy at one point. InputError: there are none."""
+        """Rows of one strategy at one point. InputError: there are no such rows."""
         check(Side(self.stored, strategy, point), "strategy")
         return self.stored.frame.filter((pl.col("strategy") == strategy) & (pl.col("point") == point))
 
