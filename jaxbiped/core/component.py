@@ -20,7 +20,7 @@ def check_component(thing: object, base: type, where: str, hint: str = "") -> No
     Args:
       base: that it must be an instance of.
       where: the name that messages begin with.
-      hint: what to do with something that is no instance.
+      hint: what to do with something that is not an instance.
     """
     kind = type(thing).__name__
     if not isinstance(thing, base):

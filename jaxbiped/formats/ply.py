@@ -135,7 +135,7 @@ def as_numbers(element: Element) -> Element:
 
 
 def records(body: np.ndarray, at: int, element: Element, end: str) -> tuple[int, np.ndarray]:
-    """Where the records of an element end, that begin at byte `at`; and its numbers that are no lists, by name."""
+    """Where the records of an element that begin at byte `at` end; and its numbers that are not lists, by name."""
     lists = [k for k, p in enumerate(element.properties) if p.length is not None]
     if not element.count or not element.properties:
         return at, np.zeros(0, [(p.name, "f8") for p in element.properties if p.length is None])

@@ -75,7 +75,7 @@ def execution_of(executor: Executor, arena: Any, world: Any, command: Any, setti
     """What an executor makes of a command, checked. What is no distance or no time becomes a pose that is not finite.
 
     Raises:
-      InputError: something that is no execution of one robot.
+      InputError: something that is not the execution of one robot.
     """
     made = executor.execute(arena, world, command, settings)
     where = f"executor {type(executor).__name__}"

@@ -105,7 +105,7 @@ def view_of(sensor: Sensor, arena: Any, at: Standpoint, settings: Any, program: 
     """What a sensor measures, checked where it is not built in; what is not finite is all in the weights then, as NaN.
 
     Raises:
-      InputError: something that is no view of one robot.
+      InputError: something that is not the view of one robot.
     """
     view = sensor.measure(arena, at, settings, program)
     if type(sensor) in (RayCast, Oracle):

@@ -61,7 +61,8 @@ def class_grids(classes: Any, levels: Any) -> tuple[np.ndarray | jax.Array, np.n
     The level of a cell that is an obstacle or unmeasured is not read, so it may be anything.
 
     Raises:
-      InputError: no integers, too few axes; of concrete grids also a class that is no `Cell` and a level beyond int8.
+      InputError: not integers, or too few axes; for concrete grids also a class that is not a `Cell`, or a level
+        beyond int8.
     """
     classes = integers("classes", classes, "H W")
     levels = integers("levels", levels, "H W")

@@ -75,7 +75,7 @@ def read_path(field: CostToGo, edge_costs: Any, start_ij: Any, max_length: int, 
       heading: [*B], direction of the move before the first, -1 for none (the default).
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a heading that is no direction.
+      InputError: an argument of another rank, shape or dtype, or a heading that is not a direction.
     """
     cost, edges = reals("field.cost", field.cost, "H W"), reals("edge_costs", edge_costs, "8 H W")
     start = cells("start_ij", start_ij)

@@ -30,7 +30,7 @@ class ImageSpec:
     principal point is the middle of the image.
 
     Raises:
-      InputError: a field that is no integer of 1 or more, or more rays than pixels.
+      InputError: a field that is not an integer of 1 or more, or more rays than pixels.
     """
 
     width: int = 512  # [px]

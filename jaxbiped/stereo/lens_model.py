@@ -35,7 +35,7 @@ FALSE = ("", "0", "0.0", "false", "no", "off", "none")
 
 
 def check_lens_model(fields: Mapping[str, object], file: str | Path) -> None:
-    """Raise `InputError` where a calibration names a lens that is no pinhole with OpenCV's distortion.
+    """Raise `InputError` where a calibration names a lens that is not a pinhole with OpenCV's distortion.
 
     Args:
       fields: what the file holds, by its own names; mappings in it are looked into.

@@ -284,7 +284,7 @@ def check_complete(folder: str | Path, manifest: Manifest, rows: int) -> None:
 
 
 def broken_shard(path: Path, error: Exception) -> InputError:
-    """The one line about a shard that is no Parquet file, or one cut short."""
+    """The one line about a shard that is not a Parquet file, or is cut short."""
     first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
     return InputError(f"is damaged, or no Parquet file: {first_line}", file=path)
 

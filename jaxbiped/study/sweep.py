@@ -190,7 +190,7 @@ def check_field(name: str, config: Mapping[str, Any]) -> None:
 
 
 def flat(tree: Mapping[str, Any], name: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of all that is no table."""
+    """Dotted names and values of everything that is not a table."""
     for key, value in tree.items():
         dotted = f"{name}.{key}" if name else key
         if isinstance(value, Mapping):
