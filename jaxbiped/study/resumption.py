@@ -121,7 +121,7 @@ def refuse_other_config(folder: Path, manifest: Manifest, config: Model) -> None
     ]
     if changes:
         more = f", and {len(changes) - SHOWN} more" if len(changes) > SHOWN else ""
-        message = f"was begun with another config, and can go on with that one only: {', '.join(changes[:SHOWN])}{more}"
+        message = f"was started with another config, and can only be resumed with that one: {', '.join(changes[:SHOWN])}{more}"
         raise InputError(message, file=folder)
 
 
@@ -147,7 +147,7 @@ def refuse_other_program(folder: Path, manifest: Manifest, device_name: str) -> 
         f"{name} {there.get(name, ABSENT)} (here {value})" for name, value in here.items() if there.get(name) != value
     ]
     if changes:
-        message = f"was begun with {', '.join(changes)}, and can go on with the same only"
+        message = f"was started with {', '.join(changes)}, and can only be resumed with the same"
         raise InputError(message, file=folder / MANIFEST)
 
 

@@ -163,9 +163,9 @@ def edit(folder, **changes):
 def test_other_versions_are_refused(stopped):
     versions = store.read_manifest(stopped).versions
     edit(stopped, versions=versions | {"jax": "0.1.0"})
-    refused(stopped, r"manifest.json: was begun with jax 0.1.0 \(here .*\), and can go on with the same only")
+    refused(stopped, r"manifest.json: was started with jax 0.1.0 \(here .*\), and can only be resumed with the same")
     edit(stopped, versions=versions, device="8 x TPU v4")
-    refused(stopped, r"was begun with device TPU v4 \(here cpu\)")
+    refused(stopped, r"was started with device TPU v4 \(here cpu\)")
     edit(stopped, format=2)
     refused(stopped, r"reads manifests of format 1 \(got 2\)")
 
