@@ -121,7 +121,8 @@ def refuse_other_config(folder: Path, manifest: Manifest, config: Model) -> None
     ]
     if changes:
         more = f", and {len(changes) - SHOWN} more" if len(changes) > SHOWN else ""
-        message = f"was started with another config, and can only be resumed with that one: {', '.join(changes[:SHOWN])}{more}"
+        which = f"{', '.join(changes[:SHOWN])}{more}"
+        message = f"was started with another config, and can only be resumed with that one: {which}"
         raise InputError(message, file=folder)
 
 
