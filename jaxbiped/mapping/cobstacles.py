@@ -84,16 +84,12 @@ def solid_levels(
     to the first gap, `params.below_points` are enough, where that is not None.
     """
     height, width = columns.shape
-    points = patch_sum(jnp.moveaxis(evidence, -1, 0), spec)
-    padded = jnp.pad(points, ((1, 1), (0, 0), (0, 0)))
-    leaking = greatest_within(greater(padded[:-2], padded[2:]), spec.beside)
-
-    def pack_planes(voxels):
-        return pack(jnp.moveaxis(voxels, 0, -1), spec)
-
-    dense = columns & pack_planes((points >= params.solid_points) & (points >= params.voxel_share * leaking))
+    points = jnp.moveaxis(patch_sum(jnp.moveaxis(evidence, -1, 0), spec), 0, -1)
+    padded = jnp.pad(points, ((0, 0), (0, 0), (1, 1)))
+    leaking = greatest_within(greater(padded[..., :-2], padded[..., 2:]), spec.beside, axes=(0, 1))
+    dense = columns & pack((points >= params.solid_points) & (points >= params.voxel_share * leaking), spec)
     if params.below_points is not None:
-        dense = downwards(dense, columns & pack_planes(points >= params.below_points))
+        dense = downwards(dense, columns & pack(points >= params.below_points, spec))
     others = dense << 1 | dense >> 1
     around = jnp.pad(dense | others, 1)
     for i, j in itertools.product(range(3), range(3)):

@@ -142,12 +142,12 @@ def greater(a: Array, b: Array) -> Array:
     return jnp.where(a > b, a, b)
 
 
-def greatest_within(planes: Float[Array, "K H W"], reach: int) -> Float[Array, "K H W"]:
-    """In each plane the greatest of each cell and those up to `reach` cells from it, across and along."""
-    for axis in (1, 2):
+def greatest_within(planes: Float[Array, "_ _ _"], reach: int, axes: tuple[int, int] = (1, 2)) -> Float[Array, "_ _ _"]:
+    """In each plane the greatest of each cell and those up to `reach` cells from it, along both of its `axes`."""
+    margins = [(reach, reach) if axis in axes else (0, 0) for axis in range(3)]
+    planes = jnp.pad(planes, margins, constant_values=-jnp.inf)
+    for axis in axes:
         width = 1
-        margins = [(reach, reach) if a == axis else (0, 0) for a in range(3)]
-        planes = jnp.pad(planes, margins, constant_values=-jnp.inf)
         while width < 2 * reach + 1:  # each entry is the greatest of `width` from it on
             step = min(width, 2 * reach + 1 - width)
             left = planes.shape[axis] - step

@@ -12,6 +12,7 @@ from jaxbiped import files
 from jaxbiped.errors import InputError
 from jaxbiped.report import figures
 from jaxbiped.statistics import compare
+from jaxbiped.statistics.schema import STRATEGIES
 from tests.study.synthetic import rows
 
 FRAME = rows(60)
