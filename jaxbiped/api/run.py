@@ -81,5 +81,10 @@ def load(folder: str | Path, own: Sequence[Strategy | Planner] = ()) -> Results:
     """
     frame, manifest = store.read(folder)
     return Results(
-        frame, store.read_points(folder), manifest.config, Path(folder), tuple(map(named, own)), manifest.metrics
+        rows=frame,
+        points=store.read_points(folder),
+        config=manifest.config,
+        folder=Path(folder),
+        own=tuple(map(named, own)),
+        shown=manifest.metrics,
     )

@@ -15,7 +15,8 @@ from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.statistics.schema import validate
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
-from jaxbiped.study.store import POINTS, ROWS, Store, broken_shard, create, shard_number, shard_paths
+from jaxbiped.study.shard_files import ROWS, broken_shard, shard_number, shard_paths
+from jaxbiped.study.store import POINTS, Store, create
 
 SHOWN = 6  # differing fields in a message
 ABSENT = "nothing"

@@ -8,7 +8,7 @@ from pathlib import Path
 import polars as pl
 
 from jaxbiped.mission.metric import format_of
-from jaxbiped.study import store
+from jaxbiped.study import shard_files, store
 from jaxbiped.study.batching import Point, Shard, groups_of, metrics_of, only_point, shards
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.components import fingerprinted
@@ -63,8 +63,8 @@ def conduct(
         results = store.create(folder, config, **kind)
     with results:
         judge = in_order(enough, parts=1 if swept else len(groups))
-        paths = store.shard_paths(results.folder) if enough is not never else []
-        if not any(judge(store.shard_number(path), pl.read_parquet(path)) for path in paths):
+        paths = shard_files.shard_paths(results.folder) if enough is not never else []
+        if not any(judge(shard_files.shard_number(path), pl.read_parquet(path)) for path in paths):
             for shard, frame in engine(config, on_progress, points=points if swept else None, done=results.done()):
                 results.append(frame, shard.number, compile_time=compile_time())
                 if judge(shard.number, frame):

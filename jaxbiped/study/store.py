@@ -28,9 +28,10 @@ from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.statistics.schema import ADDED, METRIC_NAME, SCHEMA, ordered, validate
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
+from jaxbiped.study.shard_files import ROWS, broken_shard, shard_number, shard_path, shard_paths
 from jaxbiped.terminal import command_line
 
-POINTS, ROWS = "points.parquet", "rows"
+POINTS = "points.parquet"
 
 
 class StoredRows(NamedTuple):
@@ -281,24 +282,3 @@ def check_complete(folder: str | Path, manifest: Manifest, rows: int) -> None:
     if (manifest.shards, manifest.rows) != (shards, rows):
         message = f"{shards} shards with {rows} rows, where the manifest says {manifest.shards} with {manifest.rows}"
         raise InputError(message, file=Path(folder) / ROWS)
-
-
-def broken_shard(path: Path, error: Exception) -> InputError:
-    """The one line about a shard that is not a Parquet file, or is cut short."""
-    first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
-    return InputError(f"is damaged, or no Parquet file: {first_line}", file=path)
-
-
-def shard_path(folder: str | Path, shard: int) -> Path:
-    """Where a shard lies."""
-    return Path(folder) / ROWS / f"part-{shard:05d}.parquet"
-
-
-def shard_number(path: Path) -> int:
-    """The number in a shard's name."""
-    return int(path.stem.removeprefix("part-"))
-
-
-def shard_paths(folder: str | Path) -> list[Path]:
-    """The shards of a folder in the order of their numbers."""
-    return sorted((Path(folder) / ROWS).glob("part-*.parquet"), key=shard_number)

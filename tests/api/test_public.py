@@ -99,7 +99,7 @@ def test_names_that_cannot_be_shown_are_refused(name):
 
 
 def test_type_checkers_see_the_same_names():
-    """The stub beside the package, name by name and place by place."""
+    """The `.pyi` beside the package, name by name and place by place."""
     origins = vars(jb)["origins_"]
     seen = {}
     for node in ast.parse(Path(jb.__file__).with_suffix(".pyi").read_text()).body:

@@ -19,7 +19,7 @@ from jaxbiped import cli
 from jaxbiped.arenas.source import find_family, name_of
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
-from jaxbiped.study import cluster, store
+from jaxbiped.study import cluster, shard_files, store
 from jaxbiped.study.cluster import Cluster, connect, local_cluster
 from jaxbiped.study.run_study import conduct
 from tests.study import pretend
@@ -97,7 +97,7 @@ def marks(begun):
 def assert_same_study(folder, whole):
     ours, theirs = store.read(folder), store.read(whole)
     assert ours[0].equals(theirs[0]) and ours[1].state == "finished"
-    for path in store.shard_paths(whole):
+    for path in shard_files.shard_paths(whole):
         assert (folder / "rows" / path.name).read_bytes() == path.read_bytes()
 
 
@@ -166,7 +166,9 @@ def test_local_workers_go_on_with_it_and_back(whole, begun, tmp_path):
         ordered = Cluster(client, ordered=True, compute=partial(pretend.compute, begun=begun, slow=(0, 4)))
         assert [shard.number for shard, _ in ordered(CONFIG, done={1})] == [0, *range(2, 10)]
     stored = store.read_manifest(folder)
-    assert stored.state == "stopped" and 3 not in {store.shard_number(path) for path in store.shard_paths(folder)}
+    assert stored.state == "stopped" and 3 not in {
+        shard_files.shard_number(path) for path in shard_files.shard_paths(folder)
+    }
     conduct(folder, CONFIG, resume=True, engine=engine)
     assert_same_study(folder, whole)
     assert {threads for _, _, threads in marks(begun)} == {max(1, cores() // 2)}
@@ -177,7 +179,7 @@ def test_shard_that_kills_its_workers(begun, tmp_path):
     died = pytest.raises(InputError, match=r"shard 1: its workers died.*a smaller --shard needs less")
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}), local_cluster(1) as client, died:
         conduct(tmp_path / "r", CONFIG, engine=Cluster(client, compute=deadly))
-    assert store.read(tmp_path / "r")[1].state == "stopped" and len(store.shard_paths(tmp_path / "r")) == 1
+    assert store.read(tmp_path / "r")[1].state == "stopped" and len(shard_files.shard_paths(tmp_path / "r")) == 1
 
 
 def test_scheduler_and_workers_that_vanish(monkeypatch, begun, tmp_path):
@@ -210,7 +212,7 @@ def test_scheduler_and_workers_that_vanish(monkeypatch, begun, tmp_path):
     finally:
         end(worker, running)
     manifest = store.read_manifest(tmp_path / "r")
-    assert manifest.state == "stopped" and len(store.shard_paths(tmp_path / "r")) >= 4
+    assert manifest.state == "stopped" and len(shard_files.shard_paths(tmp_path / "r")) >= 4
 
 
 def installed(folder, name, version):
@@ -304,7 +306,7 @@ def test_commands_on_workers_give_the_local_table(monkeypatch, tmp_path):
     assert local.equals(ordered) and manifest.device == "2 x cpu"
     assert (tmp_path / "local/stopping.toml").read_text() == (tmp_path / "ordered/stopping.toml").read_text()
     running = start("spread", "--workers", "2")
-    while len(store.shard_paths(tmp_path / "spread")) < 1:
+    while len(shard_files.shard_paths(tmp_path / "spread")) < 1:
         assert running.poll() is None
         time.sleep(0.01)
     workers = [child for child in psutil.Process(running.pid).children() if "spawn_main" in " ".join(child.cmdline())]

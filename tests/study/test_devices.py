@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from jaxbiped.study import store
+from jaxbiped.study import shard_files, store
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ def test_number_of_devices_does_not_matter(tmp_path, sensor, counts):
         assert 0.5 < np.isfinite(expected["arr_0"]).mean() < 1
         for count in counts:
             assert store.read(tmp_path / str(count))[0].equals(first), count
-            for path in store.shard_paths(tmp_path / "1"):
+            for path in shard_files.shard_paths(tmp_path / "1"):
                 assert (tmp_path / str(count) / "rows" / path.name).read_bytes() == path.read_bytes()
             with np.load(tmp_path / f"{count}.npz") as found:
                 for name in expected:

@@ -16,7 +16,7 @@ from jaxbiped import files
 from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.errors import InputError
 from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.study import store
+from jaxbiped.study import shard_files, store
 from jaxbiped.study.lock import FolderLock
 from jaxbiped.study.resumption import refuse_taken
 from jaxbiped.study.run_study import conduct
@@ -56,7 +56,7 @@ def assert_same_study(folder, whole):
     ours, theirs = store.read(folder), store.read(whole)
     assert ours[0].equals(theirs[0]) and ours[0].height == len(TABLE)
     assert listing(folder) == listing(whole)
-    for path in store.shard_paths(whole):
+    for path in shard_files.shard_paths(whole):
         assert (folder / "rows" / path.name).read_bytes() == path.read_bytes()
     known = ("state", "config", "config_hash", "versions", "seed", "arenas", "shards", "rows")
     for name in known:
@@ -83,7 +83,7 @@ def test_killed_study_goes_on(tmp_path, whole, moment):
     finally:
         child.send_signal(signal.SIGKILL)
         child.wait()
-    done = len(store.shard_paths(folder))
+    done = len(shard_files.shard_paths(folder))
     assert moment <= done <= moment + 1 and store.read_manifest(folder).state == "running"
     assert (folder / ".lock").exists() and store.read(folder)[0].height == 8 * done  # readable as it is
     conduct_here(folder, resume=True, engine=partial(engine, begun=begun))
@@ -208,10 +208,10 @@ def test_two_runs_into_one_folder_are_refused(stopped):
 
 
 def test_disk_that_fills_up_leaves_what_was_stored(stopped, whole, monkeypatch):
-    count = len(store.shard_paths(stopped))
+    count = len(shard_files.shard_paths(stopped))
 
     def fills_up(_):
-        if len(store.shard_paths(stopped)) == count + 2:
+        if len(shard_files.shard_paths(stopped)) == count + 2:
             raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(files.os, "fsync", fills_up)
