@@ -9,7 +9,8 @@ import tests.typecheck  # noqa: F401
 
 ROOT = Path(__file__).parents[1]
 MODULES = [".".join(file.relative_to(ROOT).with_suffix("").parts) for file in (ROOT / "jaxbiped").rglob("*.py")]
-COMPILED = "jaxbiped.planning.kernels"  # Numba compiles functions as they are written, not wrapped in a check
+# Numba compiles functions as they are written, not wrapped in a check.
+COMPILED = "jaxbiped.planning.kernels", "jaxbiped.mapping.kernels", "jaxbiped.core.xla_ffi"
 # Compiled kernels: one folder for all processes of the suite, which is not the user's.
 os.environ.setdefault("JAXBIPED_CACHE", str(ROOT / ".pytest_cache" / "jaxbiped"))
 install_import_hook(

@@ -2,7 +2,7 @@
 
 `jax.pure_callback` hands its function arrays that JAX makes while it waits for the program, which can wait for ever
 where all threads of the device are busy. Here XLA calls a C function of ours through its foreign function interface
-(see `planning.kernels.xla_ffi`), which makes NumPy arrays of the memory itself. On other devices it is
+(see `core.xla_ffi`), which makes NumPy arrays of the memory itself. On other devices it is
 `jax.pure_callback`.
 """
 
@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 NAME = "jaxbiped_host_call"
-# Places of the fields, in words of 8 bytes from the beginning of their structure; as in `planning.kernels.xla_ffi`.
+# Places of the fields, in words of 8 bytes from the beginning of their structure; as in `core.xla_ffi`.
 FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULT_COUNT, FRAME_RESULTS = 1, 7, 9, 12, 14
 BUFFER_DTYPE, BUFFER_DATA, BUFFER_RANK, BUFFER_SHAPE = 2, 3, 4, 5
 EXTENSION_TYPE, EXTENSION_METADATA, METADATA_VERSION, METADATA = 1, 3, 3, 1

@@ -9,16 +9,18 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, patch_sum
 from jaxbiped.mapping.params import MapParams
-from jaxbiped.mapping.relief import Relief, Surfaces, greater, greatest_within, is_untenable, read_relief
+from jaxbiped.mapping.relief import SURE, Relief, Surfaces, greater, greatest_within, is_untenable, read_relief
 
 
 @checked(numbers=("evidence", "surfaces", "body", "params"))
@@ -47,11 +49,57 @@ def c_obstacles(
     checks.finite("evidence", evidence)
     for name in ("weight", "rise"):
         checks.finite(f"surfaces.{name}", getattr(surfaces, name))
+    return class_cells(evidence, surfaces, careful(body, params), params, spec)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(4,))
+def class_cells(
+    evidence: Float[Array, "H W Z"], surfaces: Surfaces, body: Body, params: MapParams, spec: GridSpec
+) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
+    """`c_obstacles` of arguments that are known to be good: on a CPU by a compiled kernel, elsewhere by XLA."""
+    by_kernel, by_xla = (partial(way, spec=spec) for way in (class_by_kernel, class_by_xla))
+    return jax.lax.platform_dependent(evidence, surfaces, body, params, cpu=by_kernel, default=by_xla)
+
+
+@class_cells.defjvp
+def class_cells_jvp(spec, primals, tangents):
+    """Integers do not change with what they are read from."""
+    out = class_cells(*primals, spec)
+    return out, tuple(np.zeros(leaf.shape, jax.dtypes.float0) for leaf in out)
+
+
+def class_by_xla(evidence, surfaces, body, params, spec):
+    """`class_cells` in JAX."""
     columns = occupied_levels(evidence, params, spec)
     ground = ground_level(columns, evidence, spec)
     solid = solid_levels(columns, evidence, params, spec)
     relief = read_relief(surfaces, ground, columns, solid, params, spec)
-    return read_cells(solid, ground, relief, careful(body, params), params.head_margin, spec)
+    return read_cells(solid, ground, relief, body, params.head_margin, spec)
+
+
+def class_by_kernel(evidence, surfaces, body, params, spec):
+    """`class_cells` by machine code: a view without points is added to the map."""
+    from jaxbiped.mapping.kernels import map_update  # with Numba, which only a CPU needs
+
+    votes, level_votes = (jnp.zeros((*spec.shape, kinds)) for kinds in (4, spec.ground_levels))
+    points = tuple(jnp.zeros(0, kind) for kind in map_update.POINT_KINDS)
+    maps = evidence, votes, level_votes, surfaces
+    *_, classes, levels = map_update.add_view(maps, points, *kernel_settings(body, params, spec), spec)
+    return classes, levels
+
+
+def kernel_settings(
+    body: Body, params: MapParams, spec: GridSpec
+) -> tuple[Float[Array, "K"], Bool[Array, "R R"], UInt32[Array, "2"]]:
+    """The numbers, the disc and the levels in the way that `kernels.map_update` reads a map by."""
+    numbers = (
+        params.voxel_points * spec.cell_share, params.voxel_share, params.solid_points,
+        jnp.inf if params.below_points is None else params.below_points,
+        SURE * params.height_sd, body.step, body.step_tolerance, body.height_tolerance, body.height_tolerance / 2,
+        params.view_points * spec.cell_share,
+    )  # fmt: skip
+    bands = jnp.stack(obstructing_levels(body, params.head_margin, spec))
+    return jnp.stack([jnp.asarray(n, jnp.float32) for n in numbers]), disc(body.radius, spec), bands
 
 
 def careful(body: Body, params: MapParams) -> Body:
@@ -142,35 +190,46 @@ def read_cells(
     highest = dilate(relief.top, body.radius, spec, greater, -jnp.inf)
     blocked = highest > relief.height + relief.error + body.step + body.step_tolerance
     blocked |= is_untenable(relief, ground, body, spec)
-    lower_face = (jnp.arange(32) - 0.5) * spec.level_height
-    above_step = lower_face >= body.step
-    squatting = near & band(above_step & (lower_face + head_margin < body.squatting), ground)
-    standing = near & band(above_step & (lower_face < body.standing), ground)
+    bands = obstructing_levels(body, head_margin, spec)
+    squatting, standing = (near & (band << ground.astype(jnp.uint32)) for band in bands)
     classes = jnp.where(ground > 0, Cell.BUMP, Cell.FLOOR)
     classes = jnp.where(standing != 0, Cell.GATE, classes)
     classes = jnp.where((squatting != 0) | blocked, Cell.OBSTACLE, classes)
     return classes.astype(jnp.int8), ground.astype(jnp.int8)
 
 
-def band(levels: Bool[Array, "32"], ground: Int[Array, "H W"]) -> UInt32[Array, "H W"]:
-    """The mask of `levels` (Bool [32]), which are relative to the ground, in absolute levels for each cell."""
-    bits = jnp.sum(jnp.where(levels, jnp.uint32(1) << jnp.arange(32, dtype=jnp.uint32), 0), dtype=jnp.uint32)
-    return bits << ground.astype(jnp.uint32)
+def obstructing_levels(
+    body: Body, head_margin: Float[Array, ""] | float, spec: GridSpec
+) -> tuple[UInt32[Array, ""], UInt32[Array, ""]]:
+    """Masks of the levels, counted from the ground, that a squatting body meets, and a standing one."""
+    lower_face = (jnp.arange(32) - 0.5) * spec.level_height
+    above_step = lower_face >= body.step
+    heads = lower_face + head_margin < body.squatting, lower_face < body.standing
+    bits = jnp.uint32(1) << jnp.arange(32, dtype=jnp.uint32)
+    return tuple(jnp.sum(jnp.where(above_step & below, bits, 0), dtype=jnp.uint32) for below in heads)
+
+
+def disc(radius: Float[Array, ""], spec: GridSpec) -> Bool[Array, "R R"]:
+    """Which offsets of whole rows and columns bring a cell's square nearer than `radius` [m]; (0, 0) always does.
+
+    By symmetry this quarter of them is all. `radius` is traced, so it holds those up to `spec.max_radius`.
+    """
+    reach = max(math.ceil(spec.max_radius / spec.pitch + 0.5) - 1, 0)
+    gap = jnp.maximum(jnp.arange(reach + 1) - 0.5, 0.0) * spec.pitch
+    return (gap[:, None] ** 2 + gap[None, :] ** 2 < radius**2).at[0, 0].set(True)
 
 
 def dilate(columns: Array, radius: Float[Array, ""], spec: GridSpec, combine=jnp.bitwise_or, nothing=0) -> Array:
     """OR of the columns [H, W] whose square comes nearer than `radius` [m] to a cell's centre, its own always included.
 
-    `radius` is traced, so all offsets up to `spec.max_radius` are visited; a larger radius is cut to that.
+    All offsets of `disc` are visited; a radius beyond `spec.max_radius` is cut to that.
 
     Args:
       combine: what gathers them in place of OR; `nothing` is what changes nothing there.
     """
-    reach = max(math.ceil(spec.max_radius / spec.pitch + 0.5) - 1, 0)
-    gap = jnp.maximum(jnp.arange(reach + 1) - 0.5, 0.0) * spec.pitch
-    within = (gap[:, None] ** 2 + gap[None, :] ** 2 < radius**2).at[0, 0].set(True)
-    # By symmetry one quarter of the offsets decides: grow each row by every half width that some row distance needs,
-    # then gather the rows above and below.
+    within = disc(radius, spec)
+    reach = len(within) - 1
+    # Grow each row by every half width that some row distance needs, then gather the rows above and below.
     height, width = columns.shape
     nothing = jnp.asarray(nothing, columns.dtype)
     padded = jnp.pad(columns, ((0, 0), (reach, reach)), constant_values=nothing)

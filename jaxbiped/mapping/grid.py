@@ -90,10 +90,19 @@ class GridSpec:
         """Sizes of the axes of what lies on this grid, by their letters."""
         return {"H": self.shape[0], "W": self.shape[1], "Z": self.levels, "G": self.ground_levels}
 
+    def ground_heights(self) -> Float[np.ndarray, "G"]:
+        """Height [m] of each ground level, float32."""
+        return np.arange(self.ground_levels, dtype=np.float32) * np.float32(self.level_height)
+
     @property
     def cell_share(self) -> float:
         """A cell's area as a share of 5 x 5 cm, the cell that thresholds on numbers of points are stated for."""
         return (self.pitch / 0.05) ** 2
+
+    @property
+    def patch_aside(self) -> int:
+        """How many cells on each side of a cell make up the patch of about 5 x 5 cm around it."""
+        return int(0.025 / self.pitch + 1e-6)
 
     @property
     def beside(self) -> int:
@@ -142,7 +151,7 @@ def flat_index(
 
 def patch_sum(planes: Float[Array, "K H W"], spec: GridSpec) -> Float[Array, "K H W"]:
     """Sums over the patch of about 5 x 5 cm around each cell, at least its own; beyond the rim there is nothing."""
-    aside = int(0.025 / spec.pitch + 1e-6)  # cells on each side that make up the patch
+    aside = spec.patch_aside
     if not aside:
         return planes
     height, width = planes.shape[1:]

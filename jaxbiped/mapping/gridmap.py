@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -11,12 +12,12 @@ from jaxtyping import Array, Bool, Float, Int
 from jaxbiped.core import checks
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_world
-from jaxbiped.mapping.cobstacles import c_obstacles
+from jaxbiped.mapping.cobstacles import careful, class_by_xla, kernel_settings
 from jaxbiped.mapping.fading import Eye, forget
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, flat_index
 from jaxbiped.mapping.leveling import level_view
 from jaxbiped.mapping.params import MapParams
-from jaxbiped.mapping.relief import Surfaces, add_surfaces, no_surfaces
+from jaxbiped.mapping.relief import Surfaces, add_surfaces, no_surfaces, surface_share
 from jaxbiped.sensing.view import View
 
 AS_GOOD = 0.003  # [m] off its level, up to which the ground that a robot stands on is taken to be at it
@@ -82,16 +83,61 @@ def update(
         # Without this the compiler solves for the plane again at every point (a third of the time of an update).
         view = jax.lax.optimization_barrier(view)
     index, counts = voxel_of(view, pose, params, spec)
-    points = voxelise(view, index, counts, spec)
-    points = jnp.where(points >= params.voxel_points * spec.cell_share, points, 0.0)
+    if eye is not None:
+        grid_map = forget(grid_map, view, voxelise(view, index, counts, params, spec), pose, eye, spec)
+    return add_view(grid_map, view, pose.z, index, counts, careful(body, params), params, spec)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(7,))
+def add_view(
+    grid_map: GridMap,
+    view: View,
+    z: Float[Array, ""],
+    index: Int[Array, "N"],
+    counts: Bool[Array, "N"],
+    body: Body,
+    params: MapParams,
+    spec: GridSpec,
+) -> GridMap:
+    """The map of one arena after what one more view tells: on a CPU by a compiled kernel, elsewhere by XLA.
+
+    Args:
+      view: brought level, in the robot frame; `z` [m] the height of what the robot stands on.
+      index, counts: the voxel of each point, and whether it counts.
+      body: the careful one (`cobstacles.careful`).
+    """
+    by_kernel, by_xla = (partial(way, spec=spec) for way in (add_view_by_kernel, add_view_by_xla))
+    arguments = grid_map, view, z, index, counts, body, params
+    return jax.lax.platform_dependent(*arguments, cpu=by_kernel, default=by_xla)
+
+
+@add_view.defjvp
+def add_view_jvp(spec, primals, tangents):
+    """Derivatives of the sums of points; classes do not change with them."""
+    return jax.jvp(partial(add_view_by_xla, spec=spec), primals, tangents)
+
+
+def add_view_by_xla(grid_map, view, z, index, counts, body, params, spec):
+    """`add_view` in JAX."""
+    points = voxelise(view, index, counts, params, spec)
     count = points.sum(-1)
     count = jnp.where(count >= params.view_points * spec.cell_share, count, 0.0)
-    if eye is not None:
-        grid_map = forget(grid_map, view, points, pose, eye, spec)
-    surfaces = add_surfaces(grid_map.surfaces, view, pose.z, index, counts, params, spec)
+    surfaces = add_surfaces(grid_map.surfaces, view, z, index, counts, params, spec)
     evidence = grid_map.evidence + points
-    classes, levels = c_obstacles(evidence, surfaces, body, params, spec)
+    classes, levels = class_by_xla(evidence, surfaces, body, params, spec)
     return add_votes(replace(grid_map, evidence=evidence, surfaces=surfaces), count, classes, levels)
+
+
+def add_view_by_kernel(grid_map, view, z, index, counts, body, params, spec):
+    """`add_view` by machine code."""
+    from jaxbiped.mapping.kernels import map_update  # with Numba, which only a CPU needs
+
+    maps = grid_map.evidence, grid_map.votes, grid_map.level_votes, grid_map.surfaces
+    points = index, counts, view.weight, surface_share(view, params), view.z + z
+    evidence, votes, level_votes, weight, rise, *_ = map_update.add_view(
+        maps, points, *kernel_settings(body, params, spec), spec
+    )
+    return GridMap(evidence=evidence, votes=votes, level_votes=level_votes, surfaces=Surfaces(weight, rise))
 
 
 def voxel_of(view: View, pose: Pose, params: MapParams, spec: GridSpec) -> tuple[Int[Array, "N"], Bool[Array, "N"]]:
@@ -108,12 +154,15 @@ def voxel_of(view: View, pose: Pose, params: MapParams, spec: GridSpec) -> tuple
     return index, counts
 
 
-def voxelise(view: View, index: Int[Array, "N"], counts: Bool[Array, "N"], spec: GridSpec) -> Float[Array, "H W Z"]:
-    """Pixels of one view in each voxel: one scatter."""
+def voxelise(
+    view: View, index: Int[Array, "N"], counts: Bool[Array, "N"], params: MapParams, spec: GridSpec
+) -> Float[Array, "H W Z"]:
+    """Pixels of one view in each voxel, few of which are none: one scatter."""
     (height, width), depth = spec.shape, spec.levels
     flat = jnp.zeros(height * width * depth)
     flat = flat.at[index].add(jnp.where(counts, view.weight, 0.0), mode="promise_in_bounds")
-    return flat.reshape(height, width, depth)
+    points = flat.reshape(height, width, depth)
+    return jnp.where(points >= params.voxel_points * spec.cell_share, points, 0.0)
 
 
 def add_votes(

@@ -69,15 +69,21 @@ def add_surfaces(
     counts = counts & (level < spec.ground_levels)
     cell = jnp.where(counts, level * (spec.shape[0] * spec.shape[1]) + index // spec.levels, 0)
     least = jnp.where(surfaces.weight > 0, surfaces.rise / jnp.maximum(surfaces.weight, 1e-6) - FACE, -jnp.inf)
-    rise = view.z + z - level * spec.level_height
+    # A product here would be rounded by some compilers and not by others.
+    rise = view.z + z - jnp.take(spec.ground_heights(), level, mode="clip")
     counts = counts & ((level == 0) | (rise >= least.reshape(-1)[cell]))
-    weight = jnp.where(counts, view.weight / (1 + (view.x**2 + view.y**2) / params.height_range**2), 0.0)
+    weight = jnp.where(counts, surface_share(view, params), 0.0)
     rise = jnp.where(counts, weight * rise, 0.0)
 
     def add(old, new):
         return old.reshape(-1).at[cell].add(new, mode="promise_in_bounds").reshape(old.shape)
 
     return Surfaces(add(surfaces.weight, weight), add(surfaces.rise, rise))
+
+
+def surface_share(view: View, params: MapParams) -> Float[Array, "N"]:
+    """How much each point tells of the surface that it lies on [px]."""
+    return view.weight / (1 + (view.x**2 + view.y**2) / params.height_range**2)
 
 
 def read_relief(

@@ -7,9 +7,10 @@ import pytest
 from numba import njit
 
 from jaxbiped import planning
+from jaxbiped.core import xla_ffi
 from jaxbiped.planning import wavefront
 from jaxbiped.planning.costs import Costs, Rules, tables
-from jaxbiped.planning.kernels import LANES, grids, heading, heading_sweep, line_sweep, solvers, xla_ffi
+from jaxbiped.planning.kernels import LANES, grids, heading, heading_sweep, line_sweep, solvers
 
 H, W = 5, 7
 CLASSES = np.ones((LANES, H, W), np.int8)

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from numba import njit
 
+from jaxbiped.core import xla_ffi
 from jaxbiped.core.ready_programs import TARGETS
 from jaxbiped.planning.costs import DIRECTIONS
-from jaxbiped.planning.kernels import xla_ffi
 
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 NAME = "jaxbiped_crossing_faces"

@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 from numba import carray, njit
 
+from jaxbiped.core import xla_ffi
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import FORBIDDEN
-from jaxbiped.planning.kernels import line_sweep, xla_ffi
+from jaxbiped.planning.kernels import line_sweep
 from jaxbiped.planning.kernels.line_sweep import LANES
 from jaxbiped.planning.kernels.vector_ops import pricing, translation, transposition
 

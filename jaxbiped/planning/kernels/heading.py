@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from numba import carray, njit
 
+from jaxbiped.core import xla_ffi
 from jaxbiped.core.ready_programs import TARGETS
 from jaxbiped.planning.costs import DIRECTIONS
 from jaxbiped.planning.kernels import heading_sweep as sweep
-from jaxbiped.planning.kernels import xla_ffi
 
 DI, DJ = (tuple(int(d) for d in column) for column in DIRECTIONS.T)
 LOCK = Lock()

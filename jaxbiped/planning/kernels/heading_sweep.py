@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 from numba import carray, njit
 
+from jaxbiped.core import xla_ffi
 from jaxbiped.planning.costs import DIRECTIONS
-from jaxbiped.planning.kernels import xla_ffi
 from jaxbiped.planning.kernels.vector_ops import relaxation
 
 LANES = 8  # arenas a vector

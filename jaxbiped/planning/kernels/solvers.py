@@ -10,8 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from numba import carray, njit
 
+from jaxbiped.core import xla_ffi
 from jaxbiped.core.ready_programs import TARGETS
-from jaxbiped.planning.kernels import dijkstra, grids, line_sweep, xla_ffi
+from jaxbiped.planning.kernels import dijkstra, grids, line_sweep
 from jaxbiped.planning.kernels.line_sweep import LANES
 from jaxbiped.planning.kernels.names import METHODS as METHODS
 

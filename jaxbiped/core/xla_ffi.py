@@ -14,15 +14,15 @@ import numpy as np
 from numba import carray, cfunc, config, njit, types
 from numba.extending import intrinsic
 
+from jaxbiped.core import machine_code
 from jaxbiped.errors import InputError
-from jaxbiped.planning.kernels import objects
 
 if config.DISABLE_JIT:  # the command line overrides it; a script's own setting is not ours to change
     raise InputError("must be 0 or unset: planners are compiled by Numba", field="NUMBA_DISABLE_JIT", value=1)
 
 # Places of the fields, in words of 8 bytes from the beginning of their structure.
 FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULTS = 1, 7, 9, 14
-BUFFER_DATA, BUFFER_SHAPE = 3, 5
+BUFFER_DATA, BUFFER_RANK, BUFFER_SHAPE = 3, 4, 5
 EXTENSION_TYPE, EXTENSION_METADATA, METADATA_VERSION = 1, 3, 3
 METADATA = 1  # type of the extension with which XLA asks for which version of the interface a function was written
 VERSION = np.uint64(1 << 32)  # major 0 in the lower half of the word, minor 1 in the upper
@@ -63,6 +63,12 @@ def shape(buffers, k):
 
 
 @njit
+def rank(buffers, k):
+    """The number of its axes."""
+    return np.int64(words(words(buffers, k + 1)[k], BUFFER_RANK + 1)[BUFFER_RANK])
+
+
+@njit
 def answered(frame):
     """Whether this call only asked for the version of the interface, which is now told."""
     if frame[FRAME_EXTENSION] == 0:
@@ -87,7 +93,7 @@ def register(name: str, function, *, keep: bool = False) -> None:
     arguments. It must not raise: there is nobody to catch.
 
     Args:
-      keep: on disk, as the one function of this name (`kernels.objects`).
+      keep: on disk, as the one function of this name (`core.machine_code`).
     """
     new = ctypes.pythonapi.PyCapsule_New
     new.restype, new.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
@@ -96,7 +102,7 @@ def register(name: str, function, *, keep: bool = False) -> None:
 
 def compile_handler(name: str, function, keep: bool) -> int:
     """The address of the function that XLA is to call, from the disk where it is kept there; for `call` as well."""
-    address = objects.load(name) if keep else None
+    address = machine_code.load(name) if keep else None
     if address is None:
 
         @cfunc(types.uint64(types.CPointer(types.uint64)))
@@ -109,7 +115,7 @@ def compile_handler(name: str, function, keep: bool) -> int:
         HANDLERS[name] = handler  # kept: XLA holds its address
         address = handler.address
         if keep:
-            objects.store(name, handler)
+            machine_code.store(name, handler)
     ADDRESSES[name] = address
     return address
 
@@ -126,6 +132,7 @@ def call(name: str, arguments, results) -> None:
         shapes = [np.array(array.shape, np.int64) for array in arrays]
         buffers = np.zeros((len(arrays), BUFFER_SHAPE + 1), np.uint64)
         buffers[:, BUFFER_DATA] = [array.ctypes.data for array in arrays]
+        buffers[:, BUFFER_RANK] = [array.ndim for array in arrays]
         buffers[:, BUFFER_SHAPE] = [shape.ctypes.data for shape in shapes]
         return [buffer.ctypes.data for buffer in buffers], (shapes, buffers)
 

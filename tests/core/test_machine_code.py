@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numba import njit
 
+from jaxbiped.core import machine_code, xla_ffi
 from jaxbiped.core.cache_location import VARIABLE, cache_folder
-from jaxbiped.planning.kernels import objects, xla_ffi
 
 NAME = "jaxbiped_test_doubled"
 
@@ -29,7 +29,7 @@ def doubled(arguments, count, results):
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setenv(VARIABLE, str(tmp_path / "cache"))
-    yield tmp_path / "cache" / "kernels" / objects.key()
+    yield tmp_path / "cache" / "kernels" / machine_code.key()
     for known in (xla_ffi.HANDLERS, xla_ffi.ADDRESSES):
         known.pop(NAME, None)
 
@@ -44,7 +44,7 @@ def test_what_is_kept_is_the_same_function(folder):
     xla_ffi.compile_handler(NAME, doubled, keep=True)
     compiled = answer()
     assert compiled == [1, 3, 5, 7, 9] and [file.name for file in folder.iterdir()] == [NAME]
-    address = objects.load(NAME)
+    address = machine_code.load(NAME)
     assert address and address != xla_ffi.ADDRESSES[NAME]
     xla_ffi.ADDRESSES[NAME] = address
     assert answer() == compiled
@@ -54,7 +54,7 @@ def test_what_is_kept_is_the_same_function(folder):
 
 
 def test_a_damaged_file_is_none(folder):
-    assert objects.load(NAME) is None
+    assert machine_code.load(NAME) is None
     xla_ffi.compile_handler(NAME, doubled, keep=True)
     whole = (folder / NAME).read_bytes()
     other = bytes([whole[-1] ^ 1])
@@ -68,16 +68,16 @@ def test_a_damaged_file_is_none(folder):
     ]
     for data in wrong:
         (folder / NAME).write_bytes(data)
-        assert objects.load(NAME) is None
+        assert machine_code.load(NAME) is None
     xla_ffi.compile_handler(NAME, doubled, keep=True)
     assert (
         answer() == [1, 3, 5, 7, 9]
         and (folder / NAME).read_bytes()[:50] == whole[:18] + (folder / NAME).read_bytes()[18:50]
     )
-    assert objects.load(NAME)
+    assert machine_code.load(NAME)
     (folder / NAME).unlink()
     (folder / NAME).mkdir()
-    assert objects.load(NAME) is None
+    assert machine_code.load(NAME) is None
 
 
 def test_without_a_folder_it_works_all_the_same(folder, tmp_path, monkeypatch):
@@ -90,21 +90,21 @@ def test_without_a_folder_it_works_all_the_same(folder, tmp_path, monkeypatch):
     for wrong in (tmp_path / "file", tmp_path / "file" / "below", "/proc/none", "~nobody_of_this_name/x"):
         monkeypatch.setenv(VARIABLE, str(wrong))
         xla_ffi.compile_handler(NAME, doubled, keep=True)
-        assert answer() == [1, 3, 5, 7, 9] and objects.load(NAME) is None
+        assert answer() == [1, 3, 5, 7, 9] and machine_code.load(NAME) is None
 
 
 def test_a_changed_source_has_another_key(tmp_path, monkeypatch):
-    shutil.copytree(objects.PLANNING, tmp_path / "planning")
-    monkeypatch.setattr(objects, "SOURCES", (tmp_path / "planning",))
-    first = objects.key.__wrapped__()
-    assert first == objects.key.__wrapped__()
+    shutil.copytree(machine_code.PACKAGE / "planning", tmp_path / "planning")
+    monkeypatch.setattr(machine_code, "SOURCES", (tmp_path / "planning",))
+    first = machine_code.key.__wrapped__()
+    assert first == machine_code.key.__wrapped__()
     with (tmp_path / "planning" / "costs.py").open("a") as file:
         file.write("#")
-    assert objects.key.__wrapped__() != first
+    assert machine_code.key.__wrapped__() != first
 
 
 def test_only_the_last_versions_stay(folder):
-    for k in range(objects.OLDEST + 4):
+    for k in range(machine_code.OLDEST + 4):
         old = folder.parent / f"old{k}"
         old.mkdir(parents=True)
         (old / "kernel").write_text("x")
@@ -112,10 +112,10 @@ def test_only_the_last_versions_stay(folder):
     xla_ffi.compile_handler(NAME, doubled, keep=True)
     left = {f.name for f in folder.parent.iterdir()}
     assert (
-        len(left) == objects.OLDEST
+        len(left) == machine_code.OLDEST
         and folder.name in left
         and "old0" not in left
-        and f"old{objects.OLDEST + 3}" in left
+        and f"old{machine_code.OLDEST + 3}" in left
     )
 
 
@@ -123,8 +123,8 @@ def test_many_at_once(folder):
     xla_ffi.compile_handler(NAME, doubled, keep=True)
     handler = xla_ffi.HANDLERS[NAME]
     with ThreadPoolExecutor(8) as pool:
-        list(pool.map(lambda _: objects.store(NAME, handler), range(40)))
-    assert [file.name for file in folder.iterdir()] == [NAME] and objects.load(NAME)
+        list(pool.map(lambda _: machine_code.store(NAME, handler), range(40)))
+    assert [file.name for file in folder.iterdir()] == [NAME] and machine_code.load(NAME)
 
 
 PROGRAM = """
@@ -132,7 +132,7 @@ import sys
 import jax
 import numpy as np
 from jaxbiped import planning
-from jaxbiped.planning.kernels import xla_ffi
+from jaxbiped.core import xla_ffi
 
 jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.0)
 missed = []
@@ -167,7 +167,7 @@ import sys
 import jax, jax.numpy as jnp, numpy as np
 from numba import njit
 from jaxbiped.jax_settings import own_settings
-from jaxbiped.planning.kernels import xla_ffi
+from jaxbiped.core import xla_ffi
 
 factor = int(sys.argv[1])
 

@@ -1,8 +1,8 @@
 """Machine code of kernels on disk: what Numba compiled once, the next process loads, in milliseconds.
 
 Numba's own cache cannot keep these kernels: they are closures over instructions made at run time, which it cannot tell
-apart. But all that they are made of is known: the sources of `planning` and of the classes of cells, the versions of
-Python, Numba and LLVM, and the kind of processor. A hash of these is the key: a changed program is never loaded.
+apart. But all that they are made of is known: the sources of `planning` and `mapping`, the versions of Python, Numba
+and LLVM, and the kind of processor. A hash of these is the key: a changed program is never loaded.
 
 A file that is damaged, cut short or not readable is compiled anew; a folder that cannot be written to is done without.
 """
@@ -25,8 +25,8 @@ from numba.core.runtime import rtsys
 from jaxbiped.core import kept_files
 from jaxbiped.core.cache_location import KERNELS, cache_folder
 
-PLANNING = Path(__file__).parents[1]
-SOURCES = (PLANNING, PLANNING.parent / "mapping" / "grid.py")
+PACKAGE = Path(__file__).parents[1]
+SOURCES = tuple(PACKAGE / source for source in ("planning", "mapping", "core/xla_ffi.py"))  # what kernels are made of
 MAGIC = b"jaxbiped kernel 1\n"
 OLDEST = 8  # versions of the program whose kernels are kept
 
