@@ -50,10 +50,10 @@ lint: install
 	$(BIN)/mypy
 
 bench: install
-	$(BIN)/python sweeps/bench_startup.py
-	$(BIN)/python sweeps/bench_planning.py
-	$(BIN)/python sweeps/bench_mapping.py
-	$(BIN)/python sweeps/bench_mission.py
+	$(BIN)/python -m sweeps.benchmarks.startup
+	$(BIN)/python -m sweeps.benchmarks.planning
+	$(BIN)/python -m sweeps.benchmarks.mapping
+	$(BIN)/python -m sweeps.benchmarks.mission
 
 # The guide, built into build/site; broken links and names that are not there are errors.
 $(VENV)/docs-installed: $(VENV)/installed

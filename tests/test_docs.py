@@ -28,7 +28,7 @@ GROUPS = {
     held.group
     for held in (registry.STRATEGIES, registry.FAMILIES, registry.SENSORS, registry.EXECUTORS, registry.METRICS)
 }
-PLACEHOLDERS = {"sweeps/NAME.toml"}
+PLACEHOLDERS = {"sweeps/studies/NAME.toml"}
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 
 
@@ -128,7 +128,7 @@ def test_links_and_pictures_exist(page):
 
 @pages
 def test_commands_and_their_options_exist(page):
-    scripts = {name for path in (ROOT / "sweeps").glob("*.py") for name in script_options(path)}
+    scripts = {name for path in (ROOT / "sweeps").rglob("*.py") for name in script_options(path)}
     anywhere = scripts.union(*map(options, cli.COMMANDS))
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     for span in spans(page):
@@ -145,7 +145,9 @@ def test_commands_and_their_options_exist(page):
         elif line[0] == "make":
             assert line[1] in targets, span
         elif line[:2] == ["python", "-m"]:
-            assert importlib.util.find_spec(line[2]), span
+            found = importlib.util.find_spec(line[2])
+            assert found, span
+            known = script_options(Path(found.origin))
         elif line[0] == "python":
             known = script_options(ROOT / line[1])
         assert set(given(line)) <= known, span
