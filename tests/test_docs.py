@@ -12,7 +12,9 @@ import pydantic
 import pytest
 import yaml
 
+import figures
 import jaxbiped
+from figure_marks import unmarked
 from jaxbiped import cli
 from jaxbiped.core import registry
 
@@ -32,23 +34,29 @@ PLACEHOLDERS = {"sweeps/studies/NAME.toml"}
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 
 
+@cache
+def seen(page: Path) -> str:
+    """A page without the marks round its figures, as readers see it."""
+    return unmarked(page.read_text())
+
+
 def prose(page: Path) -> str:
     """A page without its blocks of code."""
-    return FENCE.sub("", page.read_text())
+    return FENCE.sub("", seen(page))
 
 
 def spans(page: Path) -> list[str]:
     """What a page has in code type: its inline spans and the lines of its shell blocks, each on one line."""
     inline = re.findall(r"`([^`]+)`", prose(page))
-    lines = [line for kind, text in FENCE.findall(page.read_text()) if kind == "sh" for line in text.splitlines()]
-    quoted = re.findall(r'"(jaxbiped [^"{]*)', page.read_text())  # in a script that submits one
+    lines = [line for kind, text in FENCE.findall(seen(page)) if kind == "sh" for line in text.splitlines()]
+    quoted = re.findall(r'"(jaxbiped [^"{]*)', seen(page))  # in a script that submits one
     parts = (part for text in (*inline, *lines, *quoted) for part in text.split("&&"))
     return [" ".join(part.split()) for part in parts]
 
 
 def blocks(page: Path) -> list[str]:
     """Its blocks of Python, with the files that they are made of."""
-    found = [text for kind, text in FENCE.findall(page.read_text()) if kind == "python"]
+    found = [text for kind, text in FENCE.findall(seen(page)) if kind == "python"]
     return [SNIPPET.sub(lambda match: (ROOT / match[1]).read_text(), text) for text in found]
 
 
@@ -155,18 +163,18 @@ def test_commands_and_their_options_exist(page):
 
 @pages
 def test_paths_exist(page):
-    for place in PLACE.findall(page.read_text()):
+    for place in PLACE.findall(seen(page)):
         assert place in PLACEHOLDERS or list(ROOT.glob(place)), place
-    for path in SNIPPET.findall(page.read_text()):
+    for path in SNIPPET.findall(seen(page)):
         assert (ROOT / path).is_file(), path
 
 
 @pages
 def test_modules_and_public_names_exist(page):
     public = set(jaxbiped.__all__) | jaxbiped.modules_ | {"__all__"}
-    for name in re.findall(r"\bjb\.([A-Za-z_]\w*)", page.read_text()):
+    for name in re.findall(r"\bjb\.([A-Za-z_]\w*)", seen(page)):
         assert name in public, name
-    for name in MODULE.findall(page.read_text()):
+    for name in MODULE.findall(seen(page)):
         assert name in GROUPS or name.partition(".")[2] in public or is_there(name), name
 
 
@@ -225,9 +233,13 @@ def drawing() -> str:
     return (GUIDE / "architecture.svg").read_text()
 
 
+def test_figures_are_those_of_their_file():
+    assert figures.check(ROOT) == []
+
+
 def test_figures_of_readme_are_those_of_the_guide():
-    rows = [line for line in (ROOT / "README.md").read_text().splitlines() if re.match(r"\| .*\[.*\d.*\]", line)]
-    guide = "\n".join(path.read_text() for path in PAGES[1:])
+    rows = [line for line in seen(ROOT / "README.md").splitlines() if re.match(r"\| .*\[.*\d.*\]", line)]
+    guide = "\n".join(seen(path) for path in PAGES[1:])
     numbers = [[cell.strip() for cell in row.split("|") if re.search(r"\d", cell)] for row in rows]
     lines = [line for line in guide.splitlines() if line.startswith("|")]
     assert len(rows) > 15
