@@ -15,6 +15,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -174,7 +175,7 @@ def rerun(root: Path, only: Sequence[str] = ()) -> list[str]:
     """Run the commands that take under a minute; names the figures that differ from the file by more than they may.
 
     Args:
-      root: of the checkout, where they run.
+      root: of the checkout.
       only: names of runs; all of them unless it is given.
     """
     runs = read(root / "docs" / "figures.toml")
@@ -190,19 +191,24 @@ def rerun(root: Path, only: Sequence[str] = ()) -> list[str]:
 
 
 def output(command: str, root: Path) -> str:
-    """What a command prints.
+    """What a command prints. It runs in an empty folder, since what it writes may be in the checkout already.
+
+    Args:
+      command: its words that are paths of the checkout lead there.
+      root: of the checkout.
 
     Raises:
       InputError: it fails, cannot be run, or prints nothing.
     """
     words = shlex.split(command)
     own = {"python": [sys.executable], "jaxbiped": [sys.executable, "-m", "jaxbiped"]}
-    words = own.get(words[0], words[:1]) + words[1:]
+    words = own.get(words[0], words[:1]) + [str(root / word) if (root / word).exists() else word for word in words[1:]]
     environment = os.environ | {"COLUMNS": WIDTH, "PYTHONPATH": str(root)}
     try:
-        done = subprocess.run(
-            words, cwd=root, env=environment, capture_output=True, encoding="utf-8", timeout=LIMIT, check=False
-        )
+        with tempfile.TemporaryDirectory() as room:
+            done = subprocess.run(
+                words, cwd=room, env=environment, capture_output=True, encoding="utf-8", timeout=LIMIT, check=False
+            )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise InputError(f"cannot be run: {error}", field="command", value=command) from None
     if done.returncode:

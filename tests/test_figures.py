@@ -154,6 +154,12 @@ def test_what_takes_under_a_minute_is_printed_again_and_compared_within_its_tole
     ]
 
 
+def test_what_a_command_writes_is_not_in_the_way_of_the_next_time(root):
+    (root / "say.py").write_text(f"import os\nos.mkdir('results')\n{SAY}")
+    assert figures.main(["rerun"], root) == 0 and figures.main(["rerun"], root) == 0
+    assert not (root / "results").exists()
+
+
 @pytest.mark.parametrize("said", ["ratio nan, share 90.2 [87.5, 92.3] %", "ratio 5.8, share 90.2 [87.5] %"])
 def test_nan_and_numbers_that_are_missing_differ(root, capsys, said):
     (root / "say.py").write_text(f"print({said!r})")
