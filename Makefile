@@ -4,10 +4,10 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: install compare quick test test-all lint bench docs clean
+.PHONY: install compare quick test test-all lint bench figures docs clean
 
 # The quickest tests of every room: a minute on two cores.
-QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_house.py test_imports.py core \
+QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_figures.py test_house.py test_imports.py core \
   $(addprefix arenas/, test_scene.py) \
   $(addprefix mapping/, test_class_grid.py test_grid.py test_leveling.py) \
   $(addprefix formats/, test_cloud.py test_moving_ai.py test_ros_map.py) \
@@ -50,10 +50,14 @@ lint: install
 	$(BIN)/mypy
 
 bench: install
-	$(BIN)/python sweeps/bench_startup.py
-	$(BIN)/python sweeps/bench_planning.py
-	$(BIN)/python sweeps/bench_mapping.py
-	$(BIN)/python sweeps/bench_mission.py
+	$(BIN)/python -m sweeps.benchmarks.startup
+	$(BIN)/python -m sweeps.benchmarks.planning
+	$(BIN)/python -m sweeps.benchmarks.mapping
+	$(BIN)/python -m sweeps.benchmarks.mission
+
+# Prints those figures of README and the guide again that take under a minute, and compares them with docs/figures.toml.
+figures: install
+	$(BIN)/python docs/figures.py rerun
 
 # The guide, built into build/site; broken links and names that are not there are errors.
 $(VENV)/docs-installed: $(VENV)/installed

@@ -12,7 +12,9 @@ import pydantic
 import pytest
 import yaml
 
+import figures
 import jaxbiped
+from figure_marks import unmarked
 from jaxbiped import cli
 from jaxbiped.core import registry
 
@@ -28,27 +30,33 @@ GROUPS = {
     held.group
     for held in (registry.STRATEGIES, registry.FAMILIES, registry.SENSORS, registry.EXECUTORS, registry.METRICS)
 }
-PLACEHOLDERS = {"sweeps/NAME.toml"}
+PLACEHOLDERS = {"sweeps/studies/NAME.toml"}
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+
+
+@cache
+def seen(page: Path) -> str:
+    """A page without the marks round its figures, as readers see it."""
+    return unmarked(page.read_text())
 
 
 def prose(page: Path) -> str:
     """A page without its blocks of code."""
-    return FENCE.sub("", page.read_text())
+    return FENCE.sub("", seen(page))
 
 
 def spans(page: Path) -> list[str]:
     """What a page has in code type: its inline spans and the lines of its shell blocks, each on one line."""
     inline = re.findall(r"`([^`]+)`", prose(page))
-    lines = [line for kind, text in FENCE.findall(page.read_text()) if kind == "sh" for line in text.splitlines()]
-    quoted = re.findall(r'"(jaxbiped [^"{]*)', page.read_text())  # in a script that submits one
+    lines = [line for kind, text in FENCE.findall(seen(page)) if kind == "sh" for line in text.splitlines()]
+    quoted = re.findall(r'"(jaxbiped [^"{]*)', seen(page))  # in a script that submits one
     parts = (part for text in (*inline, *lines, *quoted) for part in text.split("&&"))
     return [" ".join(part.split()) for part in parts]
 
 
 def blocks(page: Path) -> list[str]:
     """Its blocks of Python, with the files that they are made of."""
-    found = [text for kind, text in FENCE.findall(page.read_text()) if kind == "python"]
+    found = [text for kind, text in FENCE.findall(seen(page)) if kind == "python"]
     return [SNIPPET.sub(lambda match: (ROOT / match[1]).read_text(), text) for text in found]
 
 
@@ -128,7 +136,7 @@ def test_links_and_pictures_exist(page):
 
 @pages
 def test_commands_and_their_options_exist(page):
-    scripts = {name for path in (ROOT / "sweeps").glob("*.py") for name in script_options(path)}
+    scripts = {name for path in (ROOT / "sweeps").rglob("*.py") for name in script_options(path)}
     anywhere = scripts.union(*map(options, cli.COMMANDS))
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     for span in spans(page):
@@ -145,7 +153,9 @@ def test_commands_and_their_options_exist(page):
         elif line[0] == "make":
             assert line[1] in targets, span
         elif line[:2] == ["python", "-m"]:
-            assert importlib.util.find_spec(line[2]), span
+            found = importlib.util.find_spec(line[2])
+            assert found, span
+            known = script_options(Path(found.origin))
         elif line[0] == "python":
             known = script_options(ROOT / line[1])
         assert set(given(line)) <= known, span
@@ -153,18 +163,18 @@ def test_commands_and_their_options_exist(page):
 
 @pages
 def test_paths_exist(page):
-    for place in PLACE.findall(page.read_text()):
+    for place in PLACE.findall(seen(page)):
         assert place in PLACEHOLDERS or list(ROOT.glob(place)), place
-    for path in SNIPPET.findall(page.read_text()):
+    for path in SNIPPET.findall(seen(page)):
         assert (ROOT / path).is_file(), path
 
 
 @pages
 def test_modules_and_public_names_exist(page):
     public = set(jaxbiped.__all__) | jaxbiped.modules_ | {"__all__"}
-    for name in re.findall(r"\bjb\.([A-Za-z_]\w*)", page.read_text()):
+    for name in re.findall(r"\bjb\.([A-Za-z_]\w*)", seen(page)):
         assert name in public, name
-    for name in MODULE.findall(page.read_text()):
+    for name in MODULE.findall(seen(page)):
         assert name in GROUPS or name.partition(".")[2] in public or is_there(name), name
 
 
@@ -223,9 +233,13 @@ def drawing() -> str:
     return (GUIDE / "architecture.svg").read_text()
 
 
+def test_figures_are_those_of_their_file():
+    assert figures.check(ROOT) == []
+
+
 def test_figures_of_readme_are_those_of_the_guide():
-    rows = [line for line in (ROOT / "README.md").read_text().splitlines() if re.match(r"\| .*\[.*\d.*\]", line)]
-    guide = "\n".join(path.read_text() for path in PAGES[1:])
+    rows = [line for line in seen(ROOT / "README.md").splitlines() if re.match(r"\| .*\[.*\d.*\]", line)]
+    guide = "\n".join(seen(path) for path in PAGES[1:])
     numbers = [[cell.strip() for cell in row.split("|") if re.search(r"\d", cell)] for row in rows]
     lines = [line for line in guide.splitlines() if line.startswith("|")]
     assert len(rows) > 15

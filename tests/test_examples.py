@@ -23,7 +23,7 @@ def test_examples_are_short_and_use_the_public_names_alone(path):
 def test_examples_run(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [str(path), "out" if path.stem.startswith("05") else "6"])
-    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.syspath_prepend(path.parent)  # as `python path` does
     runpy.run_path(str(path), run_name="__main__")
     said = capsys.readouterr().out
     assert "full" in said or "bump_aware" in said

@@ -36,7 +36,7 @@ def main(args: SweepArgs) -> int:
     config = SweepConfig.model_validate(args.model_dump(include=set(SweepConfig.model_fields)))
     if not config.fields():
         raise InputError(
-            "a sweep needs [[axes]] or [sobol] in its file: jaxbiped sweep sweeps/costs.toml", field="axes"
+            "a sweep needs [[axes]] or [sobol] in its file: jaxbiped sweep sweeps/studies/costs.toml", field="axes"
         )
     points = tuple(config.points())
     config = fingerprinted(config)

@@ -209,8 +209,8 @@ class OdometryConfig(Model):
 
 
 class VisualConfig(Model):
-    """Visual odometry of the ray-cast sensor. The defaults are what `sweeps/visual_odometry.py` prints of rendered
-    pictures, rounded up, with every preset.
+    """Visual odometry of the ray-cast sensor. The defaults are what `sweeps/studies/visual_odometry.py` prints of
+    rendered pictures, rounded up, with every preset.
 
     Standard deviations are those where a tenth of the image's pixels shows what both views measure; they fall with
     the square root of that share.

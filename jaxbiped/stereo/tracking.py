@@ -32,7 +32,7 @@ ASTRAY, TURNED = 0.05, 0.15  # [m, rad] by which dead reckoning may be off
 LEAST = 12  # matches that must agree on a motion
 ROUNDS = 8  # of least squares
 KEPT = 256  # views: of more robots than walk at once
-INFLATION = 2.0  # of the covariance: errors of neighbours are alike (`sweeps/visual_odometry.py`)
+INFLATION = 2.0  # of the covariance: errors of neighbours are alike (`sweeps/studies/visual_odometry.py`)
 
 
 @dataclass(frozen=True)

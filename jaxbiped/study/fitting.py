@@ -27,7 +27,7 @@ CONTRAST_PLACES, CONTRAST_VIEWS = 3, 2
 # Times the camera's across, and thirds of its down: far cells are low in a picture.
 MORE_RAYS = (1, 3), (1, 4), (2, 6), (2, 8), (4, 12)
 # Share of the cells that is to be that of rendered pairs; these come to 0.99 of themselves with other noise. Maps that
-# have 0.92 in common still part at edges that few rays meet, and missions with them (`sweeps/bench_stereo.py`).
+# have 0.92 in common still part at edges that few rays meet, and missions with them (`sweeps/benchmarks/stereo.py`).
 ALIKE = 0.975
 NEVER_FURTHER = LandmarkConfig(sd=0, sd_per_metre=0, nearest=0, furthest_circle=100, furthest_square=100)
 

@@ -1,12 +1,9 @@
 """A number of a planner of your own as the axis of a sweep: 03_sweep_own_number.py [ARENAS]"""
 
 import sys
-from pathlib import Path
 
 import jaxbiped as jb
-
-sys.path.insert(0, str(Path(__file__).parent / "planners"))
-from clearance import Clearance
+from planners.clearance import Clearance
 
 count = int(sys.argv[1]) if len(sys.argv) > 1 else 100
 study = jb.Study(jb.RandomArenas(count=count), ["full", Clearance()])

@@ -1,7 +1,6 @@
 """One study with planners of all kinds, played once for all tests of the public API."""
 
 import heapq
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +8,10 @@ import pytest
 
 import jaxbiped as jb
 from jaxbiped.planning import DIRECTIONS
+from sweeps.examples.planners.clearance import Clearance
 from tests.reference import planning as reference
 
 EXAMPLES = Path(__file__).parents[2] / "sweeps" / "examples"
-sys.path.insert(0, str(EXAMPLES / "planners"))
 
 
 def plain_dijkstra(classes, levels, start_ij, goal_ij, costs):
@@ -56,8 +55,6 @@ def gives_up(classes, levels, start_ij, goal_ij, costs):
 
 @pytest.fixture(scope="session")
 def study():
-    from clearance import Clearance
-
     return jb.Study(
         jb.RandomArenas(count=12),
         [

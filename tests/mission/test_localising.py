@@ -146,7 +146,7 @@ def test_missions_where_nothing_can_be_seen_end(arena, sensor, way):
 def test_missions_go_by_each_way(arena, way, middle):
     """Sixteen missions of experiment 1 arrive, and half of them know where they stand within `middle` [m].
 
-    `middle` is about twice the median of 300 random arenas (`sweeps/localisation.py`).
+    `middle` is about twice the median of 300 random arenas (`sweeps/studies/localisation.py`).
     """
     settings, static = kind(way)
     batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (SEEDS, *jnp.shape(leaf))), arena)

@@ -9,7 +9,7 @@ import pytest
 from jaxbiped import cli
 from jaxbiped.arenas import load_scene
 from jaxbiped.mission.recording import load_log
-from sweeps import make_terrain
+from sweeps.studies import make_terrain
 
 SCENE = Path(__file__).parents[2] / "configs" / "terrain" / "stairs.toml"
 

@@ -1,8 +1,8 @@
 """The closed loop for one arena at a time, in plain NumPy with a heapq planner.
 
-The oracle of the compiled loop, decision by decision, and its peer in `sweeps/bench_mission.py`. It uses the package's
-words, constants and random numbers (same seed, same noise), and none of its kernels. Arguments are the package's
-pytrees with NumPy leaves (`jax.device_get`). The ray-cast sensor and the kinematic executor only.
+The oracle of the compiled loop, decision by decision, and its peer in `sweeps/benchmarks/mission.py`. It uses the
+package's words, constants and random numbers (same seed, same noise), and none of its kernels. Arguments are the
+package's pytrees with NumPy leaves (`jax.device_get`). The ray-cast sensor and the kinematic executor only.
 """
 
 from __future__ import annotations

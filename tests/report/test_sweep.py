@@ -163,7 +163,7 @@ def test_points_of_a_study_that_sweeps_nothing(tmp_path):
     [("costs", 65, 1), ("resolution", 5, 5), ("noise", 7, 1), ("radius", 8, 1), ("bump", 30, 1), ("heights", 11, 1)],
 )
 def test_shipped_sweeps(request, name, points, programs):
-    path = request.config.rootpath / "sweeps" / f"{name}.toml"
+    path = request.config.rootpath / "sweeps" / "studies" / f"{name}.toml"
     config = load(SweepConfig, path)
     assert path.read_text().startswith(f"# {config.question}\n")
     found = list(config.points())

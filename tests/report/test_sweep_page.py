@@ -33,7 +33,7 @@ def swept(folder, config, points, strategies=("full", "floor_only"), change=lamb
     table = table.with_columns(pl.col("point").cast(pl.Int32))
     frames = [other(rows(48, strategies=strategies), change(k)).with_columns(point=pl.lit(k, pl.Int32))
               for k in range(len(points))]  # fmt: skip
-    with create(folder, config, seed=0, arenas=48, points=table, command="jaxbiped sweep sweeps/x.toml") as results:
+    with create(folder, config, seed=0, arenas=48, points=table, command="jaxbiped sweep x.toml") as results:
         results.append(pl.concat(frames))
         results.finish(compile_time=1.0)
     return folder
@@ -59,7 +59,7 @@ def test_figures_fit_the_axes(tmp_path, axes, points, drawn):
     assert len(set(names)) == len(names)
     assert all(len({sum(span for span, _ in row) for row in table}) == 1 for table in read.tables)
     assert any(len(table) == len(points) + 1 for table in read.tables)
-    assert f"{len(points)} sweep points" in read.text and "jaxbiped sweep sweeps/x.toml" in read.text
+    assert f"{len(points)} sweep points" in read.text and "jaxbiped sweep x.toml" in read.text
     assert "How does the difference between full and floor_only depend on costs.c3" in read.text
 
 

@@ -14,7 +14,7 @@ from jaxbiped.study.sweep import SweepConfig
 class SweepArgs(EngineArgs, RobotFileOptions, CameraFileOptions, SweepConfig):
     """Sweep numbers of the config: missions on the same random arenas at each point, tables and figures.
 
-    The sweep in TOML comes first, such as sweeps/costs.toml; options on the command line override it.
+    The sweep in TOML comes first, such as sweeps/studies/costs.toml; options on the command line override it.
     """
 
     BASIC: ClassVar[tuple[str, ...]] = (

@@ -1,7 +1,7 @@
 """Planners of other libraries, and of the examples, in the closed loop against `full`: README's table of planners.
 
     pip install 'jaxbiped[planners]'
-    python sweeps/outside_planners.py [--arenas 600] [--seed 0] [--out FOLDER]
+    python -m sweeps.studies.outside_planners [--arenas 600] [--seed 0] [--out FOLDER]
 
 Each is a file of under 60 lines in `sweeps/examples/planners`. All walk the same arenas with the same noise, paired
 statistics are against `full`. `plan ms` is the mean time of one plan on one core beside the other queue's; it cannot be
@@ -9,7 +9,6 @@ told of planners that are compiled into the mission's program.
 """
 
 import argparse
-import sys
 from pathlib import Path
 
 import polars as pl
@@ -17,13 +16,11 @@ from rich.console import Console
 from rich.table import Table
 
 import jaxbiped as jb
-
-sys.path.insert(0, str(Path(__file__).parent / "examples" / "planners"))
-from clearance import Clearance
-from fast_marching import fast_marching
-from pathfinding_astar import pathfinding_astar
-from rrt_connect import rrt_connect
-from wall_follower import WallFollower
+from sweeps.examples.planners.clearance import Clearance
+from sweeps.examples.planners.fast_marching import fast_marching
+from sweeps.examples.planners.pathfinding_astar import pathfinding_astar
+from sweeps.examples.planners.rrt_connect import rrt_connect
+from sweeps.examples.planners.wall_follower import WallFollower
 
 STRATEGIES = ["full", Clearance(), pathfinding_astar, fast_marching, rrt_connect, WallFollower(), jb.StraightLine()]
 

@@ -1,6 +1,6 @@
 """Matching, points and maps of single stereo pairs: how right, and how fast.
 
-    python sweeps/bench_matching.py [--arenas 12] [--seed 7] [--repeats 10]
+    python -m sweeps.benchmarks.matching [--arenas 12] [--seed 7] [--repeats 10]
 
 The Middlebury motorcycle pair (as scikit-image ships it) is compared with its published disparities. Rendered pairs,
 one from the start of each random arena with an unknown tilt, are mapped as `jaxbiped stereo` does, with gravity and

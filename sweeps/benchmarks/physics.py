@@ -1,6 +1,6 @@
 """Stepping speed: each backend's rollout against the bare engine below it, on the same model and batch, in one run.
 
-    python sweeps/bench_physics.py [--batch 64] [--steps 400] [--boxes 0 4] [--backends native mjx] [--device gpu]
+    python -m sweeps.benchmarks.physics [--batch 64] [--steps 400] [--boxes 0 4] [--backends native mjx] [--device gpu]
 
 The bare engines are `mujoco.batch.Batch.rollout`, recording qpos and qvel of every step, and a jitted scan over the
 vmapped `mjx.step` that returns them. Both sides play the same tables on bipeds of which each has boxes of its own.

@@ -1,7 +1,7 @@
 """A sweep of 64 cost vectors x 1,024 arenas x 2 strategies in one compiled program: where its time goes.
 
-    python sweeps/bench_sweep.py            # about 131,000 missions
-    python sweeps/bench_sweep.py --quick    # 8 vectors x 64 arenas
+    python -m sweeps.benchmarks.sweep            # about 131,000 missions
+    python -m sweeps.benchmarks.sweep --quick    # 8 vectors x 64 arenas
 
 The closed loop with the ray-cast camera, on costs C1 to C4 spread evenly by the logarithm around the paper's. Printed:
 how many programs of the loop were compiled, and then, with nothing left to compile, the share of the time that is

@@ -1,7 +1,7 @@
 """How much time Eq. 1 gives away: the way of least cost against the way of least time, both known perfectly.
 
-    python sweeps/heading.py [--arenas N] [--seed S] [--strategy full]     (the bound)
-    python sweeps/heading.py --speed-only                                    (planning against scipy's Dijkstra)
+    python -m sweeps.studies.heading [--arenas N] [--seed S] [--strategy full]    (the bound)
+    python -m sweeps.studies.heading --speed-only                                 (planning against scipy's Dijkstra)
 
 On the true class grid of each random arena, the way that Eq. 1 chooses, with the paper's costs or with costs fitted to
 the durations of the primitives (`jaxbiped tune --from-durations table`), is timed by the clock of a mission:
@@ -24,7 +24,6 @@ import jax.numpy as jnp
 import numpy as np
 import scipy.sparse
 import tyro
-from bench_planning import random_maps
 from rich.console import Console
 from rich.table import Table
 from scipy.sparse.csgraph import dijkstra
@@ -44,6 +43,7 @@ from jaxbiped.statistics.intervals import mean_and_median, proportion
 from jaxbiped.study.config import StrategyName
 from jaxbiped.study.durations import fit
 from jaxbiped.study.evaluation import draw
+from sweeps.benchmarks.planning import random_maps
 
 TOGETHER = 128  # arenas
 SAME, WORTH = 0.01, 0.5  # [s]

@@ -1,6 +1,6 @@
 """Rendered stereo: what it measures, maps and locates, how close the ray-cast sensor comes to it, and how fast it is.
 
-    python sweeps/bench_stereo.py [--arenas 36] [--first 1000] [--views 10] [--missions 0] [--preset FILE]
+    python -m sweeps.benchmarks.stereo [--arenas 36] [--first 1000] [--views 10] [--missions 0] [--preset FILE]
 
 Each line gives what is wanted after what was measured. Arenas are random ones of all families that no preset and no
 threshold was fitted to; views are aimed at gates, bumps and obstacles from 25 to 80 cm. Intervals are at 95 %: of gates
@@ -48,7 +48,7 @@ from jaxbiped.study.sensors import (
     worlds,
 )
 
-PRESET = Path(__file__).parents[1] / "configs" / "sensors" / "stereo.toml"
+PRESET = Path(__file__).parents[2] / "configs" / "sensors" / "stereo.toml"
 SEED, FIRST = 7, 1000  # of arenas that are in no fit
 LOST = (0.03, 0.03, np.deg2rad(3))  # [m, m, rad] by which a robot is off before it sees landmarks
 NEAR = 1.2  # [m]

@@ -1,4 +1,4 @@
-"""Writes the elevation map of configs/terrain/stairs.toml: `python sweeps/make_terrain.py`.
+"""Writes the elevation map of configs/terrain/stairs.toml: `python -m sweeps.studies.make_terrain`.
 
 An 8 bit picture, a pixel a centimetre and a grey level a millimetre: rough ground, stairs of three steps of 3 cm that
 lead up to a landing, a wall beside them, and rubble that is too high to step on. All of it is made up.
@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-FILE = Path(__file__).parents[1] / "configs" / "terrain" / "stairs.png"
+FILE = Path(__file__).parents[2] / "configs" / "terrain" / "stairs.png"
 SIZE = 1.8, 1.4  # [m]
 PIXEL, GREY = 0.01, 0.001  # [m]
 TREADS, STEP = (0.60, 0.85, 1.10), 0.03  # [m] where steps begin to rise, over a pixel, and how high they are

@@ -1,6 +1,6 @@
 """How well pictures tell a robot's own motion: rendered pairs of views of random arenas, a command apart.
 
-    python sweeps/visual_odometry.py [--arenas N] [--views N] [--seed N]
+    python -m sweeps.studies.visual_odometry [--arenas N] [--views N] [--seed N]
 
 Printed are the errors of the motion that `stereo.tracking` finds, for each kind of command, how often it finds
 one, and the errors as multiples of what it claims; then the figures of `sensing.motion.VisualConfig` that fit them:

@@ -1,7 +1,7 @@
 """What a switch past the paper gains: missions with it and by the paper's method, on the same arenas and noise.
 
-    python sweeps/switches.py heading [--arenas N] [--executor sampled]           (planning over cells and headings)
-    python sweeps/switches.py foot-placement [--arenas N] [--executor native]     (feet placed by measured edges)
+    python -m sweeps.studies.switches heading [--arenas N] [--executor sampled]       (planning over cells and headings)
+    python -m sweeps.studies.switches foot-placement [--arenas N] [--executor native] (feet placed by measured edges)
 
 For foot placement use `native`: `sampled` draws from what was measured of steps that are placed about right, so robots
 that place them badly fall more often than simulated ones, which stop at an edge and step back.

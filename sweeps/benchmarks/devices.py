@@ -1,6 +1,6 @@
 """Planning on two CPU devices against one, each device with a core of its own.
 
-    python sweeps/bench_devices.py
+    python -m sweeps.benchmarks.devices
 
 `planning.field(..., devices=...)` on the same class grids, by a process with one device that may use one core, and by
 one with two devices on two cores. Beside it stands what the machine itself gives: a loop in Numba that hardly touches

@@ -1,8 +1,8 @@
 """Speed of the closed loop: missions a second against the same loop in plain NumPy and heapq, one arena at a time.
 
-    python sweeps/bench_mission.py            # ratio to the reference, and microseconds of each part
-    python sweeps/bench_mission.py --stream   # peak memory while arenas stream through: it must not grow
-    python sweeps/bench_mission.py --sweep    # compilations of a sweep over 64 cost vectors: none after the first
+    python -m sweeps.benchmarks.mission            # ratio to the reference, and microseconds of each part
+    python -m sweeps.benchmarks.mission --stream   # peak memory while arenas stream through: it must not grow
+    python -m sweeps.benchmarks.mission --sweep    # compilations of a sweep over 64 cost vectors: none after the first
 
 Both sides use the whole machine, with two threads and two processes, on the same arenas and strategies; compile time
 is apart. The compiled side works the list of missions off several times over, as a study has many.
@@ -22,11 +22,9 @@ import argparse
 import multiprocessing
 import os
 import resource
-import sys
 import time
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -47,8 +45,6 @@ from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluation import draw, evaluate
 from jaxbiped.study.queues import run_all
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.reference import mission as reference
 
 CONFIG = MissionConfig()

@@ -1,6 +1,6 @@
 """Prints the CPU seconds of the first and of the second start of commands, of this version and of another one.
 
-    python sweeps/bench_startup.py [FOLDER]
+    python -m sweeps.benchmarks.startup [FOLDER]
 
 FOLDER: a checkout of the other version; without it there is nothing to compare with. Each version has an empty cache
 folder of its own (JAXBIPED_CACHE, and JAX's own cache for versions that know no other). The two take turns, so that
@@ -17,7 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-HERE = Path(__file__).parents[1]
+HERE = Path(__file__).parents[2]
 FIELD = """
 import numpy as np
 from jaxbiped import planning

@@ -1,6 +1,6 @@
 """Self-localisation with and without landmarks, on the same arenas with the same noise.
 
-    python sweeps/localisation.py [--arenas N] [--executor kinematic|sampled|native] [--sensor raycast|stereo]
+    python -m sweeps.studies.localisation [--arenas N] [--executor kinematic|sampled|native] [--sensor raycast|stereo]
         [--scenes-only] [--ways landmarks visual ...] [--worse 5 10]
 
 Printed for each way of localisation: how many missions reach the goal, the paired difference to landmarks with its
@@ -38,7 +38,7 @@ from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
 
-SCENES = sorted((Path(__file__).parent.parent / "configs" / "scenes").glob("experiment_*.toml"))
+SCENES = sorted((Path(__file__).parents[2] / "configs" / "scenes").glob("experiment_*.toml"))
 WAYS = ("landmarks", "odometry", "visual", "icp", "both")
 
 

@@ -1,6 +1,6 @@
 """The six experiments of the paper, ours beside the paper's figures where it gives any (Tables 3 and 4).
 
-    python sweeps/experiments.py [--seeds N] [--executor kinematic|sampled|native|mjx] [--sensor raycast|stereo]
+    python -m sweeps.studies.experiments [--seeds N] [--executor kinematic|sampled|native|mjx] [--sensor raycast|stereo]
 
 Each scene is run with several noise seeds; printed are how the missions ended, and the median distance and time of
 those that reached the goal.
@@ -31,7 +31,7 @@ from jaxbiped.study.hosted import open_eyes, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
 
-SCENES = Path(__file__).parent.parent / "configs" / "scenes"
+SCENES = Path(__file__).parents[2] / "configs" / "scenes"
 
 
 def play(item: Experiment, config: MissionConfig, seeds: int):

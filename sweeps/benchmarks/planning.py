@@ -1,6 +1,6 @@
 """Planning against its peers, both sides on all cores, compile time apart.
 
-    python sweeps/bench_planning.py [--quick]      (needs the extra `bench`: pyastar2d)
+    python -m sweeps.benchmarks.planning [--quick]      (needs the extra `bench`: pyastar2d)
 
 Peers: pyastar2d (compiled A*, one path a call) and scipy's compiled Dijkstra (a whole field), each in a pool of
 one process a core, handed their maps in large pieces. What is compared is not quite the same work, to the

@@ -1,6 +1,6 @@
 """Mapping speed: batches of views into maps and classes, against the same in NumPy, one view at a time.
 
-    python sweeps/bench_mapping.py [--views 256] [--repeats 7]
+    python -m sweeps.benchmarks.mapping [--views 256] [--repeats 7]
 
 Both sides use the whole machine: JAX runs one batch on all cores, NumPy runs one process per core. Views are ray-cast
 from random arenas beforehand and are not timed. Both sides must come to the same classes. Compile time is apart.
@@ -11,10 +11,8 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-import sys
 import time
 from functools import partial
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -25,8 +23,6 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Body, GridSpec, MapConfig, classify, empty, update
 from jaxbiped.sensing import PRESETS, raycast
 from jaxbiped.sensing.config import CameraConfig
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.reference import mapping as reference
 
 SPEC = GridSpec()

@@ -1,0 +1,1 @@
+"""Planners that the examples and the study of outside planners play."""
