@@ -49,7 +49,7 @@ def test_two_folders(here, capsys):
     stored(here / "longer", arenas=90)
     assert cli.main(["compare", "r", "longer", "--first", "full", "--second", "full", *FEW]) == 0
     printed = capsys.readouterr().out
-    assert "full (r) - full (longer)" in printed and "30 arenas that one side has" in printed
+    assert "full (r) - full (longer)" in printed and "30 arenas that only one side has" in printed
 
 
 @pytest.mark.parametrize(
@@ -73,7 +73,7 @@ def test_two_folders(here, capsys):
         (["r", "--plan-power", "--wanted-difference", "2"], ["wanted-difference", "below 1"]),
         (["r", "--power", "1"], ["--power", "less than 1"]),
         (["r", "--level", "95"], ["--level", "less than 1"]),
-        (["r", "--arenas", "10"], ["--arenas: is no option"]),
+        (["r", "--arenas", "10"], ["--arenas: is not an option"]),
         (["r", "--out", "swept"], ["out", "does not exist yet", "swept"]),
     ],
 )

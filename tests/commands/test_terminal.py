@@ -78,7 +78,7 @@ def test_terminals_that_can_show_little(tmp_path, environment):
     )
     assert done.returncode == 2 and (tmp_path / "out").is_dir() and (tmp_path / "help").stat().st_size > 200
     last = done.stderr.decode().splitlines()[-1].removeprefix("\x1b[?25h")  # shows the cursor again, after the bar
-    assert last.startswith("jaxbiped: ") and "--walk: is no option" in last and "\x1b" not in last
+    assert last.startswith("jaxbiped: ") and "--walk: is not an option" in last and "\x1b" not in last
     if "ascii" in environment.values() or "C" in environment.values():
         assert b'1 x 2 - 3 +- 4 deg -> "5"' in done.stdout
 

@@ -281,7 +281,7 @@ def test_scheduler_that_is_not_there(address, message, capsys, monkeypatch, tmp_
 def test_options_that_do_not_go_together(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["compare", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"]) == 2
-    assert "workers: goes with no --scheduler" in capsys.readouterr().err
+    assert "workers: does not go with --scheduler" in capsys.readouterr().err
     assert cli.main(["compare", "--workers", "0"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     monkeypatch.setitem(sys.modules, "distributed", None)
