@@ -242,7 +242,7 @@ def test_a_larger_plane_outside_the_search_is_refused_with_up_named(tmp_path, ca
     points = tilted_table(38.0)
     text = refused(tmp_path, points, pitch=0.02)
     assert "cloud.npz: shows a plane larger than the floor that was found and tilted by more than 30 degrees" in text
-    up = tuple(float(v) for v in re.search(r"give --up X Y Z \((\S+) (\S+) (\S+) where", text).groups())
+    up = tuple(float(v) for v in re.search(r"give --up X Y Z \((\S+) (\S+) (\S+) if", text).groups())
     run(tmp_path, points, pitch=0.02, up=up)
     assert "y is up, tilted by 38.0" in capsys.readouterr().out
 
@@ -258,7 +258,7 @@ def test_a_tilt_within_the_search_needs_no_up(tmp_path, capsys):
 
 
 def test_one_point_is_no_floor(tmp_path):
-    assert "no floor" in refused(tmp_path, np.zeros((1, 3)))
+    assert "no detectable floor" in refused(tmp_path, np.zeros((1, 3)))
 
 
 # The peak of a child's own memory, as the kernel has it for what it runs: what `resource` says of a child begins with

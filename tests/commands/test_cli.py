@@ -70,7 +70,7 @@ def refused(capsys, *argv: str) -> str:
         (["compare", "missing.toml"], ["missing.toml", "no such file"]),
         (["compare", "--arenas", "0"], ["--arenas", "greater than or equal to 1"]),
         (["compare", "--pitch", "0.03"], ["pitch", "must divide", "0.03"]),
-        (["compare", "--strategies", "full", "full"], ["named once"]),
+        (["compare", "--strategies", "full", "full"], ["must be distinct"]),
         (["compare", "--sensor", "lidar"], ["--sensor", "lidar", "raycast"]),
         (["compare", "--executor", "robot"], ["--executor", "robot", "kinematic"]),
         (["compare", "--planner", "lattice"], ["--planner", "lattice", "heading"]),

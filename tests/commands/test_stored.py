@@ -62,7 +62,7 @@ def test_two_folders(here, capsys):
         (["r", "--first", "brave"], ["first:", "brave", "floor_only"]),
         (["r", "--first", "blind_stop"], ["r: first", "must be one of full, bump_aware, floor_only", "blind_stop"]),
         (["r", "--first", "full", "--second", "full"], ["must differ from the first side"]),
-        (["r", "--second-point", "1"], ["r: second-point", "there is one point, 0"]),
+        (["r", "--second-point", "1"], ["r: second-point", "must be 0, the only point"]),
         (["swept", "--first-point", "3"], ["first-point", "0 to 2"]),
         (["swept", "--first-point", "-1"], ["--first-point", "greater than or equal to 0"]),
         (["r", "--margin-success", "0"], ["--margin-success", "greater than 0"]),

@@ -150,7 +150,7 @@ def test_compare_into_the_folder_of_a_stopped_study_says_resume(tmp_path, monkey
     manifest = tmp_path / "cut" / "manifest.json"
     manifest.write_text(manifest.read_text().replace('"finished"', '"stopped"'))
     assert cli.main(["compare", "--arenas", "6", "--out", "cut"]) == 2
-    assert "--resume goes on with it" in capsys.readouterr().err
+    assert "--resume continues" in capsys.readouterr().err
     manifest.write_text(manifest.read_text().replace('"stopped"', '"finished"'))
     assert cli.main(["compare", "--arenas", "6", "--out", "cut"]) == 2
     assert "must be a folder that does not exist yet" in capsys.readouterr().err

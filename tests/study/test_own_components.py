@@ -103,7 +103,7 @@ def test_workers_are_not_given_what_they_cannot_find():
 
     refuse_own(StudyConfig())
     FAMILIES.add("hills", Family("hills", jnp.sin), replace=True)
-    with pytest.raises(InputError, match="is registered in this process alone"):
+    with pytest.raises(InputError, match="is registered in this process only"):
         refuse_own(StudyConfig(families=("bump", "hills")))
 
 
@@ -124,7 +124,7 @@ def test_names_that_are_taken_or_cannot_be_shown_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"\.toml: name of a family"):
         scene_family(path)
     FAMILIES.add("hills", Family("hills", jnp.sin), replace=True)
-    with pytest.raises(InputError, match="goes with families that are built in only"):
+    with pytest.raises(InputError, match="can only be combined with built-in families"):
         families_of(StudyConfig(families=("traffic", "hills")))
 
 
