@@ -64,7 +64,7 @@ def check_metrics(batch: Arena, group: Group, size: int) -> None:
     """Check what metrics return before a mission is played for them; arguments as for `metric_columns`.
 
     Raises:
-      InputError: a metric whose result is not one number and one truth value.
+      InputError: a metric whose result is not one number and one boolean.
     """
     if not group.metrics:
         return

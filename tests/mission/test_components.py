@@ -32,8 +32,8 @@ def component(base, **methods):
     [
         (5, "must be \\(value, valid\\)"),
         ((ZERO,), "must be \\(value, valid\\)"),
-        ((jnp.zeros(3), NO), r"float32\[3\], bool\[\] where one number and one truth value"),
-        ((ZERO, ZERO), "one truth value"),
+        ((jnp.zeros(3), NO), r"float32\[3\], bool\[\] where one number and one boolean"),
+        ((ZERO, ZERO), "one boolean"),
         ((NO, NO), "one number"),
     ],
 )

@@ -134,7 +134,7 @@ def test_routes_that_are_none_and_states_that_change_are_named():
     with pytest.raises(InputError, match="Lab: plan must return a Route"):
         check_route(jnp.zeros((3, 1)), given, "Lab")
     for state in (None, jnp.zeros((3, 2)), jnp.zeros(3, jnp.int32)):
-        with pytest.raises(InputError, match="Lab: a route's state must be as initial_state says"):
+        with pytest.raises(InputError, match="Lab: a route's state must be like that of initial_state"):
             check_route(Route(jnp.zeros((3, 1), jnp.int8), state=state), given, "Lab")
 
 
