@@ -42,7 +42,7 @@ def cells_along(points_ij: Sequence[Sequence[float]] | Float[np.ndarray, "n 2"])
     for a, b in itertools.pairwise(points):
         crossings = []
         for axis in (0, 1):
-            # A point on the line between two cells belongs to the upper one: going down from it crosses the line at once.
+            # A point on the line between two cells belongs to the upper one: going down from it crosses the line.
             low, high = sorted((a[axis], b[axis]))
             lines = np.arange(np.floor(low) + 1, np.floor(high) + 1)
             way = 1 if b[axis] > a[axis] else -1
