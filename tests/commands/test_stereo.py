@@ -232,7 +232,7 @@ def test_what_is_refused(pair, tmp_path):
     Image.new("L", (741, 500)).save(tmp_path / "black.png")
     assert "is blank: every pixel is 0" in refused(tmp_path, left, tmp_path / "black.png")
     (tmp_path / "cut.png").write_bytes(left.read_bytes()[:9000])
-    assert "is no picture, or is damaged" in refused(tmp_path, tmp_path / "cut.png", right)
+    assert "is not a picture, or is damaged" in refused(tmp_path, tmp_path / "cut.png", right)
     assert "must show something within 0.5 m" in refused(tmp_path, left, right, max_range=0.5)
     assert "right: must have" not in refused(tmp_path, left, left)  # one picture twice matches at 0 px, infinitely far
     (tmp_path / "out").mkdir()
