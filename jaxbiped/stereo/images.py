@@ -96,7 +96,7 @@ def read_any(data: bytes, path: str | Path, field: str) -> np.ndarray:
             if samples is not None and samples.dtype != np.uint8:
                 return as_light(samples)
             if deep:
-                raise UnsupportedError(f"{picture.mode} of {sample_bits(data)} bits a sample")
+                raise UnsupportedError(f"{picture.mode} of {sample_bits(data)} bits per sample")
         return np.asarray(picture.convert("L" if picture.mode in ("L", "LA", "La", "1") else "RGB"))
 
 

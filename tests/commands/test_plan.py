@@ -243,7 +243,7 @@ def test_bad_maps_are_refused_by_name(bumpy, tmp_path):
     (tmp_path / "cut.npz").write_bytes(bumpy.read_bytes()[:200])
     assert refused(tmp_path, tmp_path / "cut.npz", (1, 1), (2, 1)).startswith(f"{tmp_path / 'cut.npz'}: ")
     Image.new("RGB", (9, 9), "red").save(tmp_path / "photo.png")
-    assert "is no map" in refused(tmp_path, tmp_path / "photo.png", (1, 1), (2, 1))
+    assert "is not a map" in refused(tmp_path, tmp_path / "photo.png", (1, 1), (2, 1))
 
 
 def test_an_existing_folder_is_refused_before_anything_is_read(tmp_path):

@@ -106,7 +106,7 @@ def test_ten_bits_in_sixteen_are_kept_in_every_kind_of_file(tmp_path, scene, kin
         paths.append(tmp_path / f"{name}.any")
         paths[-1].write_bytes(DEEP_FILES[kind](deep))
     if kind not in ("png", "ppm") and number == 2:
-        with pytest.raises(InputError, match=r"not supported(: TIFF of \d+ bits a sample with such channels)?$"):
+        with pytest.raises(InputError, match=r"not supported(: TIFF of \d+ bits per sample with such channels)?$"):
             load_pair(*paths)
         return
     for got, image in zip(load_pair(*paths), scene, strict=False):
