@@ -123,7 +123,7 @@ PCD = "VERSION 0.7\nFIELDS {}\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEI
         ("c.pcd", PCD.format("x y z").replace("ascii", "lz4"), "DATA: must be one of ascii, binary, binary_compressed"),
         ("c.pcd", PCD.format("x y i"), "must have the fields x, y and z; it has x, y, i"),
         ("c.npz", "PK", "is not an .npz, or is truncated"),
-        ("c.npy", "hello", "is no .npy point cloud, or is damaged"),
+        ("c.npy", "hello", "is not a .npy point cloud, or is damaged"),
         ("c.las", "LASF", r"cloud: must be one of .npz, .npy, .ply, .pcd \(got '.las'\)"),
     ],
 )
