@@ -29,9 +29,7 @@ PREFIXES = ("JAX_", "NUMBA_")
 # Prefixes of variables read by our libraries: they distinguish errors of the libraries from ours.
 READ = (*PREFIXES, "XLA_", "MUJOCO_", "PYOPENGL_", "MPL", "MATPLOTLIB", "POLARS_", "CUDA_", "TPU_", "PJRT_")
 OF_DEVICES = ("JAX_PLATFORMS", "JAX_PLATFORM_NAME", "JAX_NUM_CPU_DEVICES", "JAX_DEFAULT_DEVICE")
-PARSE_FLAGS = (
-    "from jaxlib import xla_client; xla_client.CompileOptions()"  # XLA terminates a process whose flags are wrong
-)
+PARSE_FLAGS = "from jaxlib import xla_client; xla_client.CompileOptions()"  # XLA terminates a process with bad flags
 FLAGS_TIME = 60.0  # [s] time limit for that
 LOGGED = re.compile(r"^[EF]\d{4} \S+ +\d+ \S+\] (.*?)\.?$", re.MULTILINE)  # an error in XLA's log format
 

@@ -31,9 +31,7 @@ class Request:
     squat: bool = False  # while walking
     squat_end: bool = False
     duration: float = 16.0  # [s]
-    lean: float = (
-        0.0  # [m] offset from a foot's middle, away from the edge, where it carries the weight on the upper ground
-    )
+    lean: float = 0.0  # [m] of the load on the upper ground: from the foot's middle, away from the edge
 
     def __post_init__(self):
         for field in ("forward", "left", "turn", "rise", "duration", "lean"):

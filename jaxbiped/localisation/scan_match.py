@@ -39,9 +39,7 @@ LEAST_LENGTH = 0.008  # [m] smallest standard deviation along a line
 REACH = 0.06  # [m] from a line's middle within which a point may belong to it
 WIDE = 3.0  # standard deviations beyond which a point does not belong to it
 ROUNDS = 5
-INDEPENDENT = (
-    12.0  # number of independent points that a view counts as: their errors, and those of the map, are correlated
-)
+INDEPENDENT = 12.0  # independent points that a view counts as: their errors, and the map's, are correlated
 LEAST_POINTS = 8.0  # fewest points on lines for a match
 
 

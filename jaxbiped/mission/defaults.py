@@ -26,9 +26,7 @@ BY_CHOICE: dict[str, dict[str, dict[str, float]]] = {
     "executor": {"kinematic": {}, OTHER: {"robot.radius": SWAYING}},
     "sensor": {"stereo": {"mapping.below_points": BELOW_POINTS}},
 }
-FOLLOWING = {
-    "robot.height_tolerance": "limits.height_tolerance"
-}  # field: the field whose value is its default, if given
+FOLLOWING = {"robot.height_tolerance": "limits.height_tolerance"}  # field: that whose value is its default, if given
 OF_PRESET = ("stereo", "landmarks")  # parts whose fields come from the preset; and `camera`, if the preset has rays
 OF_FILE: dict[str, type[Model]] = {"robot": RobotConfig, "camera": CameraConfig}
 DECIDING = ("preset", *BY_CHOICE, *FOLLOWING.values())

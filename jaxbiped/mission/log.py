@@ -92,9 +92,7 @@ class MissionLog:
     true_z: Float[np.ndarray, "T"] | None = None  # [m] height of the ground that the robot stood on
     squat: Bool[np.ndarray, "T"] | None = None  # its stance
     seen: Int[np.ndarray, "T"] | None = None  # landmarks seen in the last measurement
-    points: tuple[
-        Float32[np.ndarray, "_ 3"], ...
-    ] = ()  # T clouds [m] of the last measurements, in the believed world frame
+    points: tuple[Float32[np.ndarray, "_ 3"], ...] = ()  # T clouds [m] of the last measurements, believed world frame
     voxels: Bool[np.ndarray, "T H W Z"] | None = None  # occupied; k: (k - 1/2) to (k + 1/2) `level_height`
     level_height: float = 0.03  # [m]
     walk: Walk | None = None  # of a simulated biped

@@ -30,14 +30,9 @@ ASKEW = 0.05  # [rad] deviation from the normal above which it turns before it w
 RESIDUAL = 0.025  # [rad] a smaller turn is not worth playing before a step
 LARGE = 0.2  # [rad] turns above this sweep the feet over the ground beside them
 SIDESTEP = 0.015  # [m] a smaller sidestep is not worth playing
-SURE_DISTANCE, SURE_ANGLE = (
-    0.0028,
-    0.035,
-)  # [m, rad] standard deviations below which an edge is crossed without another look
+SURE_DISTANCE, SURE_ANGLE = 0.0028, 0.035  # [m, rad] standard deviations below which an edge is crossed without a look
 SLACK = 0.01  # [m] distance kept between the feet and an edge that they do not cross
-LANES = np.array(
-    [0.0, 0.025, -0.025, 0.05, -0.05, 0.075, -0.075, 0.10, -0.10], np.float32
-)  # [m] lateral offsets, in the order tried
+LANES = np.array([0.0, 0.025, -0.025, 0.05, -0.05, 0.075, -0.075, 0.10, -0.10], np.float32)  # [m] to the side, as tried
 SAME_PLACE, SAME_ANGLE = 0.08, 1.0  # [m, rad] largest deviation of the map's edge from its measured position
 IN_VIEW = 1.0  # [rad] angle from the heading within which an edge is visible when the robot looks down
 STEADY = 0.09  # [rad] standard deviation of an edge's angle above which it is measured again before a turn

@@ -45,10 +45,7 @@ FIELD_OF_VIEW = math.radians(97)  # across, of the stereo camera
 VIEW_RANGE = 0.60  # [m] drawn; the camera sees farther
 WIDTH = 6.4  # [inch] of the figure
 FRAMES_PER_SECOND, LAST_FRAME = 5, 2.0  # [1/s], [s]
-COMMON_COLOURS, PICTURE_COLOURS = (
-    120,
-    240,
-)  # size of the palette, besides the map's own; the same with pictures beside the map
+COMMON_COLOURS, PICTURE_COLOURS = 120, 240  # in the palette, besides the map's; with pictures beside it
 PICTURE_WIDTH = 3.2  # [inch] of the pictures
 
 

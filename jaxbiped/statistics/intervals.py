@@ -143,8 +143,6 @@ def analytic(samples: Float[np.ndarray, "n"], level: float) -> Float[np.ndarray,
     """Limits (low, high) of the mean by Student's t and of the median by order statistics, for many samples."""
     n = len(samples)
     mean = stats.t.interval(level, n - 1, loc=np.mean(samples), scale=stats.sem(samples))
-    rank = int(
-        stats.binom.ppf((1 - level) / 2, n, 0.5)
-    )  # this many samples may lie below the median, and as many above
+    rank = int(stats.binom.ppf((1 - level) / 2, n, 0.5))  # this many samples may lie below the median, and above
     ordered = np.partition(samples, [rank - 1, n - rank])
     return np.array([mean, (ordered[rank - 1], ordered[n - rank])])

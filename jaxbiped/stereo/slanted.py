@@ -20,10 +20,7 @@ REACH = 6  # [px] of the left image to each side over which the slope of dispari
 TRIED = (
     0.6  # of the first search's disparities, around those of a wall along the cameras' axis: 20 degrees to both sides
 )
-STRETCHES = (
-    0.6,
-    4.0,
-)  # (`noise.stretch`) range that is kept; surfaces that face the camera more are left to the first search
+STRETCHES = 0.6, 4.0  # (`noise.stretch`) range kept; surfaces that face the camera more are the first search's
 HALF = np.float32(0.5)
 WHOLE = 5  # smallest size of kept regions in halved pixels, across and down: thinner strips are rims of other surfaces
 

@@ -22,15 +22,7 @@ from jaxbiped.stereo.fit import Quality, Watched, fit_noise, quality, share, tog
 from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
 from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, standing, with_rays
 
-CONTRASTS = (
-    0.0,
-    0.0625,
-    0.125,
-    0.1875,
-    0.25,
-    0.375,
-    0.5,
-)  # at which the lowest contrast that can be matched is searched
+CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # where the lowest one that can be matched is searched
 CONTRAST_PLACES, CONTRAST_VIEWS = 3, 2
 # Multiples of the camera's columns, and thirds of its rows: far cells are low in a picture.
 MORE_RAYS = (1, 3), (1, 4), (2, 6), (2, 8), (4, 12)

@@ -46,9 +46,7 @@ class Tuning:
     """The result of tuning."""
 
     costs: dict[str, tuple[float, ...]]  # C0 to C4 by name
-    history: (
-        pl.DataFrame
-    )  # one row per step: costs before it, objective [s] of its missions, and of `start` on its arenas
+    history: pl.DataFrame  # one row per step: costs, objective [s] of its missions, and of `start` on its arenas
     swept: pl.DataFrame  # one row per point of the sweep
     test: pl.DataFrame  # one row per test arena and set of costs
     gaps: tuple[Gap, ...]
@@ -97,9 +95,7 @@ def tune(
         swept = spread_out(config, start[0], train, run)
         costs[SWEPT] = swept.sort("objective", maintain_order=True).select(NAMES).row(0)
     costs = {name: costs[name] for name in (START, TUNED, SWEPT, DURATIONS) if name in costs}
-    costs = {
-        name: tuple(float(f"{value:.4g}") for value in values) for name, values in costs.items()
-    }  # as they are written
+    costs = {name: tuple(float(f"{value:.4g}") for value in values) for name, values in costs.items()}  # as written
     result = run(np.array(list(costs.values())), test)
     seconds = objective(result, config.penalty)
     gaps = tuple(
