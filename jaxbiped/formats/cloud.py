@@ -92,7 +92,7 @@ def load(path: str | Path, scale: float = 1.0) -> Cloud:
 def read_npz(path: Path) -> np.ndarray:
     """`points`, or `x`, `y` and `z`."""
     if not zipfile.is_zipfile(path):
-        raise InputError("is not an .npz, or is truncated", file=path)
+        raise InputError("is not an .npz, or is cut short", file=path)
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             if "points" in archive.files:
@@ -102,7 +102,7 @@ def read_npz(path: Path) -> np.ndarray:
             names = ", ".join(archive.files) or "nothing"
     except (zipfile.BadZipFile, zlib.error, ValueError, KeyError, EOFError) as error:
         what = (
-            "holds pickled objects, which are rejected" if "pickle" in str(error) else "is not an .npz, or is truncated"
+            "holds pickled objects, which are rejected" if "pickle" in str(error) else "is not an .npz, or is cut short"
         )
         raise InputError(what, file=path) from None
     raise InputError(f"must hold points [N, 3], or x, y and z [N]; it holds {names}", file=path)

@@ -131,7 +131,7 @@ def check_options(cell: float | None, range: tuple[float, float] | None, scale: 
 
 def read_npz(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray, "2"], float]:
     """Heights, position of the first, and pitch."""
-    damaged = InputError("is not an .npz, or is truncated", file=path)
+    damaged = InputError("is not an .npz, or is cut short", file=path)
     try:
         with warnings.catch_warnings(), open(path, "rb") as file:
             warnings.simplefilter("ignore")  # about odd NumPy headers

@@ -66,7 +66,7 @@ def grey_values(path: Path) -> tuple[Float[np.ndarray, "P Q"], Shaped[np.ndarray
     except UnidentifiedImageError:
         raise InputError("is damaged, or a kind of picture that is not supported", file=path) from None
     except Exception:  # Pillow and OpenCV raise errors of many types for damaged pictures
-        raise InputError("is damaged or truncated", file=path) from None
+        raise InputError("is damaged or cut short", file=path) from None
     full = int(np.iinfo(samples.dtype).max) if samples.dtype.kind == "u" else None
     if samples.dtype.kind not in "uf" or (full or 0) > 65535:
         raise InputError("must be of 8 or 16 bits, or of floating-point numbers", file=path, value=str(samples.dtype))

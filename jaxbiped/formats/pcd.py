@@ -46,11 +46,11 @@ def read_pcd(path: Path) -> np.ndarray:
         return from_ascii(body, fields, points, path)
     record = sum(field.size * field.count for field in fields)
     if form == "binary" and len(body) < points * record:
-        raise InputError(f"is truncated: it holds {len(body) // record} of {points} points", file=path)
+        raise InputError(f"is cut short: it holds {len(body) // record} of {points} points", file=path)
     if form == "binary_compressed" and points:
         packed, unpacked = (int.from_bytes(body[k : k + 4], "little") for k in (0, 4))
         if len(body) < 8 + packed or unpacked != points * record:
-            raise InputError(f"is truncated or damaged: its data are not {points} points", file=path)
+            raise InputError(f"is cut short or damaged: its data are not {points} points", file=path)
     from pypcd4 import PointCloud
 
     cloud = PointCloud.from_fileobj(io.BytesIO(whole_header(fields, points, form) + body))
@@ -61,7 +61,7 @@ def read_header(data: bytes, path: Path) -> tuple[list[Field], int, str, bytes]:
     """Fields of COUNT 1 or more, the number of points, how they are packed, and their data."""
     end = re.search(rb"(?:^|[\r\n])[ \t]*DATA[ \t]+(\w+)[ \t]*(\r\n|\n|\r|$)", data[:1_000_000])
     if end is None:
-        raise InputError("is not a PCD file, or is truncated: its header must end with DATA", file=path)
+        raise InputError("is not a PCD file, or is cut short: its header must end with DATA", file=path)
     form = end[1].decode("latin-1")
     if form not in FORMS:
         raise InputError(f"must be one of {', '.join(FORMS)}", file=path, field="DATA", value=form)
@@ -114,7 +114,7 @@ def from_ascii(body: bytes, fields: list[Field], points: int, path: Path) -> np.
         except (DeprecationWarning, ValueError):
             raise InputError("is damaged: its header must be followed by numbers", file=path) from None
     if len(numbers) < points * columns:
-        raise InputError(f"is truncated: it holds {len(numbers) // columns} of {points} points", file=path)
+        raise InputError(f"is cut short: it holds {len(numbers) // columns} of {points} points", file=path)
     starts = np.cumsum([0] + [field.count for field in fields])
     names = [field.name for field in fields]
     return numbers[: points * columns].reshape(points, columns)[:, [starts[names.index(name)] for name in "xyz"]]

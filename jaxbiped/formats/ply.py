@@ -67,7 +67,7 @@ def read_ply(path: Path) -> Float64[np.ndarray, "N 3"]:
             at, table = records(body, at, element, end)
         except CutShortError as error:
             what = "points" if element.name == "vertex" else f"records of {element.name}"
-            raise InputError(f"is truncated: it holds {error} of {element.count} {what}", file=path) from None
+            raise InputError(f"is cut short: it holds {error} of {element.count} {what}", file=path) from None
         if element.name == "vertex" and points is None:
             points = np.stack([table[name].astype(np.float64) for name in "xyz"], axis=1)
     return points
@@ -80,7 +80,7 @@ def read_header(data: bytes, path: Path) -> tuple[str, list[Element], int]:
     line_end = re.search(rb"\r\n|\n|\r", data)[0]  # all lines end like the first: what follows may be binary
     end = re.search(rb"[\r\n]end_header[ \t]*(" + line_end + rb"|$)", data[:LONGEST_HEADER])
     if end is None:
-        raise InputError("is not a PLY file, or is truncated: its header does not end", file=path)
+        raise InputError("is not a PLY file, or is cut short: its header does not end", file=path)
     form, elements = "", []
     for line in data[: end.start()].decode("latin-1").split(line_end.decode())[1:]:
         words = line.split()

@@ -130,7 +130,7 @@ def read_picture(path: Path) -> tuple[UInt8[np.ndarray, "H W"], Bool[np.ndarray,
     except Exception as error:  # Pillow raises errors of many types for damaged pictures
         if isinstance(error, OSError) and error.errno:
             raise InputError(f"cannot be read: {reason(error)}", file=path) from None
-        raise InputError("is damaged or truncated", file=path) from None
+        raise InputError("is damaged or cut short", file=path) from None
     if deep:
         raise InputError("must have 8 bits per pixel and channel, but this picture has more", file=path)
     if turned != 1:

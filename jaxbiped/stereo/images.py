@@ -68,7 +68,7 @@ def read(path: str | Path, field: str) -> np.ndarray:
     except UnsupportedError as error:
         raise InputError(f"is a kind of picture that is not supported: {error}", file=path, field=field) from None
     except UnidentifiedImageError:
-        message = "is not a picture, is damaged, or is of a kind that is not supported"
+        message = "is not a picture, or is damaged, or of a kind that is not supported"
         raise InputError(message, file=path, field=field) from None
     except Exception:  # Pillow raises errors of many types for damaged pictures
         raise InputError("is not a picture, or is damaged", file=path, field=field) from None

@@ -282,7 +282,7 @@ def test_files_that_are_none(tmp_path):
     assert "must be a PNG or TIFF picture" in refused(tmp_path, "a.png", picture(GREY, "JPEG"), **PIXELS)
     single = io.BytesIO()
     np.save(single, HEIGHTS)
-    assert "is not an .npz, or is truncated" in refused(tmp_path, "a.npz", single.getvalue())
+    assert "is not an .npz, or is cut short" in refused(tmp_path, "a.npz", single.getvalue())
 
 
 WHOLE = {

@@ -213,7 +213,7 @@ def test_every_picture_cut_short_is_refused(write, tmp_path, name):
 
 def test_a_picture_of_absurd_size_is_refused(write, monkeypatch):
     monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 4)
-    assert "is damaged or truncated" in refused(write())
+    assert "is damaged or cut short" in refused(write())
 
 
 def test_the_map_in_the_repository():
