@@ -2,9 +2,9 @@
 
 Built in is the method of Yamashita, Kitaoka and Kaneko, "Motion Planning of Biped Robot Equipped with Stereo Camera
 Using Grid Map" (2011), called "the paper" in every docstring of this package. The names below are what sweep scripts
-need; each loads what it stands for when it is first used. The rooms follow the paper's Fig. 2: arenas, sensing,
-mapping, localisation, planning, motion, mission; then statistics, study and report. A room uses the rooms before it,
-never those after it.
+need; each is loaded when it is first used. The rooms follow the paper's Fig. 2: arenas, sensing, mapping,
+localisation, planning, motion, mission; then statistics, study and report. A room uses the rooms before it, never
+those after it.
 """
 
 from jaxbiped.core.lazy_loading import lazy_package

@@ -20,7 +20,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.terminal import Sink, Terminated, ended_by_signals, lasting_streams
 
 # command: (module of it and of its options, name of these, one line, whether a TOML file may come first and give the
-# defaults). What a command needs loads once its options are known to be right.
+# defaults). What a command needs is loaded only once its options are known to be valid.
 COMMANDS = {
     "compare": ("compare", "CompareArgs", "compare strategies on random arenas, with statistics", True),
     "sweep": ("sweep", "SweepArgs", "sweep numbers of the config, many points in one program", True),
@@ -29,14 +29,19 @@ COMMANDS = {
     "stereo": ("stereo", "StereoArgs", "map what a real stereo pair shows", False),
     "classify": ("classify", "ClassifyArgs", "map a point cloud or an elevation map", False),
     "primitives": ("primitives", "PrimitivesArgs", "verify the motion primitives in simulation", False),
-    "tune": ("tune", "TuneArgs", "tune the costs on random arenas, and judge them on others", True),
+    "tune": ("tune", "TuneArgs", "tune the costs on random arenas, and evaluate them on others", True),
     "fit-sensor": ("fit_sensor", "FitSensorArgs", "fit the noise of the ray-cast sensor to rendered pairs", False),
-    "reproduce": ("reproduce", "ReproduceArgs", "repeat the paper, its figures and ours on one page", False),
-    "report": ("report", "ReportArgs", "write the tables and figures of a results folder anew", False),
-    "cache": ("cache", "CacheArgs", "show or clear what is kept on disk to start sooner", False),
+    "reproduce": (
+        "reproduce",
+        "ReproduceArgs",
+        "repeat the paper's experiments, its figures and ours on one page",
+        False,
+    ),
+    "report": ("report", "ReportArgs", "rewrite the tables and figures of a results folder", False),
+    "cache": ("cache", "CacheArgs", "show or clear the cache that makes programs start sooner", False),
     "view": ("view", "ViewArgs", "show missions in the browser", False),
 }
-# What a command is when its first argument is a results folder: another module, other options.
+# The command if its first argument is a results folder: another module, other options.
 ON_FOLDERS = {"compare": ("stored", "StoredArgs")}
 ON_SCENES = ("compare",)  # commands whose first arguments may be scenes, or a folder of them
 WITHOUT_DEVICES = ("cache",)
@@ -46,7 +51,7 @@ WRONG_INPUT = 2  # exit status
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command; the entry point of the package.
 
-    Whatever becomes of the terminal, a command runs to its end: see `jaxbiped.terminal`.
+    A command runs to its end whatever happens to the terminal: see `jaxbiped.terminal`.
 
     Returns:
       The exit status: 0, 1 for a result that is a failure, 2 for input that cannot be used and output that cannot be
@@ -73,20 +78,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def refuse(error: InputError) -> int:
-    """Print the one line, and return the exit status."""
+    """Print the one-line message, and return the exit status."""
     print(f"jaxbiped: {error}", file=sys.stderr)
     return WRONG_INPUT
 
 
 def settled(status: int, output: Sink) -> int:
-    """The exit status of a command that ended with `status`, once all that it printed is written, or is not."""
+    """The exit status of a command that ended with `status`, once its output is written or has failed to be."""
     output.flush()
     problem = output.problem()
     return refuse(problem) if problem else status
 
 
 def answer(argv: list[str]) -> int:
-    """What the command line asks for: a command's exit status, or the program's own help."""
+    """Run what the command line asks for: a command, or the program's own help; return the exit status."""
     if not argv or argv[0] in ("-h", "--help"):
         print(usage())
         return 0 if argv else WRONG_INPUT
@@ -100,7 +105,7 @@ def answer(argv: list[str]) -> int:
             return dispatch(argv[0], argv[1:])
     except InputError:
         raise
-    except Exception as error:  # of a library: perhaps about what the shell told it
+    except Exception as error:  # of a library: perhaps about the environment
         found = surroundings.culprit(error)
         if found is None:
             raise
@@ -147,7 +152,7 @@ def dispatch(name: str, rest: list[str]) -> int:
 
 
 def with_scenes(rest: list[str]) -> list[str]:
-    """Options in which scene files, or a folder of them, that come first are the families, with an arena each."""
+    """Options in which leading scene files, or a leading folder of them, become families with one arena each."""
     first = list(itertools.takewhile(lambda word: not word.startswith("-"), rest))
     files = [Path(word) for word in first]
     if len(files) == 1 and files[0].is_dir() and not (files[0] / "manifest.json").exists():
@@ -157,14 +162,14 @@ def with_scenes(rest: list[str]) -> list[str]:
         return rest
     for path, fits in zip(files, is_scene, strict=True):
         if not fits:
-            raise InputError("is no scene, as the others are: it must be a TOML file with start and goal", file=path)
+            raise InputError("is not a scene like the others: it must be a TOML file with start and goal", file=path)
     options = rest[len(first) :]
     count = [] if any(word.split("=")[0] == "--arenas" for word in options) else ["--arenas", str(len(files))]
     return ["--families", *map(str, files), *count, *options]
 
 
 def defaults(options: type[Model], data: dict[str, Any], path: Path | None) -> Model:
-    """What the options are by default: what the file says, or what follows from the command line alone."""
+    """The defaults of the options: from the file, or derived from the command line alone."""
     if path is not None:
         return parse(options, data, file=path)
     try:
@@ -174,9 +179,9 @@ def defaults(options: type[Model], data: dict[str, Any], path: Path | None) -> M
 
 
 def one_line(box: str, name: str, rest: Sequence[str] = ()) -> InputError:
-    """The error that tyro draws as a box, as one line of ours, in our words.
+    """Turn the error that tyro draws as a box into one line in our words.
 
-    What counts stands between the box's title and its first rule. Rules are drawn with lines or, where the terminal has
+    The message stands between the box's title and its first rule. Rules are drawn with lines or, if the terminal has
     none, with dashes, one of them under the title.
 
     Args:
@@ -186,14 +191,14 @@ def one_line(box: str, name: str, rest: Sequence[str] = ()) -> InputError:
     rows = itertools.dropwhile(is_rule, rows[1:])
     message = " ".join(itertools.takewhile(lambda row: not is_rule(row), rows))
     message = re.sub(r"\[/?bold\]", "", message)
-    listed = f"`jaxbiped {name} --help-all` lists what {name} takes"
+    listed = f"`jaxbiped {name} --help-all` lists the options of {name}"
     if found := re.match(r"Unrecognized options: (.*)", message):
         words = found[1].split(", ")
         if not words[0].startswith("-"):
-            return InputError(f"is one word too many; {listed}", field=words[0])
+            return InputError(f"is an unexpected argument; {listed}", field=words[0])
         meant = re.search(r"Perhaps you meant:[\s│|]*(--[\w.-]+)", box)
         hint = f"did you mean {meant[1]}?" if meant else listed
-        return InputError(f"is no option of jaxbiped {name}; {hint}", field=words[0].partition("=")[0])
+        return InputError(f"is not an option of jaxbiped {name}; {hint}", field=words[0].partition("=")[0])
     if found := re.match(r"Missing value for argument '(.*?)'. Expected (\d+)", message):
         many = int(found[2])
         return InputError(f"must be given {f'{many} values' if many > 1 else 'a value'}", field=found[1])
@@ -231,7 +236,7 @@ def one_line(box: str, name: str, rest: Sequence[str] = ()) -> InputError:
 
 
 def in_words(kind: str) -> str:
-    """What tyro's name of a kind of argument stands for."""
+    """What tyro's name for a kind of argument means."""
     words = kind.split()
     if set(words) <= {"FLOAT", "INT"}:
         whole = "whole " if set(words) == {"INT"} else ""
@@ -240,14 +245,14 @@ def in_words(kind: str) -> str:
 
 
 def is_rule(row: str) -> bool:
-    """A rule in a box, or its border."""
+    """Whether a row is a rule in a box, or its border."""
     return row.startswith("╰") or set(row) <= set("─-")
 
 
 def usage() -> str:
-    """What `jaxbiped --help` prints."""
+    """The text of `jaxbiped --help`."""
     lines = "\n".join(f"  {name:<10} {summary}" for name, (_, _, summary, _) in COMMANDS.items())
-    end = "`jaxbiped COMMAND --help` shows the options that most people need, --help-all shows all of them."
+    end = "`jaxbiped COMMAND --help` shows the options that most people need, --help-all all of them."
     return f"usage: jaxbiped COMMAND [options]\n\n{lines}\n\n{end}"
 
 

@@ -1,4 +1,4 @@
-"""TOML files into frozen pydantic models, with errors that name file, field, value and what is allowed."""
+"""Read TOML files into frozen pydantic models, with errors that name file, field, value and what is allowed."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ M = TypeVar("M", bound=Model)
 
 
 def field_docs(model: type[Model]) -> dict[str, str]:
-    """The docstring of each field that has one. It is read from the source, which takes long: for help alone."""
+    """The docstring of each field that has one. Reading the source takes long, so this is for help only."""
     found = {}
     for kind in reversed(inspect.getmro(model)):
         if not issubclass(kind, Model):
@@ -42,7 +42,7 @@ def field_docs(model: type[Model]) -> dict[str, str]:
     return found
 
 
-# What pydantic found wrong, by its name for that, in our words; fields are of its context.
+# Our messages for pydantic's error types; the fields come from the error's context.
 SAID = {
     "missing": "is required",
     "extra_forbidden": "unknown key",
@@ -78,7 +78,7 @@ SAID = {
 
 
 def load_toml(path: str | Path) -> dict[str, Any]:
-    """Read a TOML file; raise `InputError` when it is missing, no text or no TOML."""
+    """Read a TOML file; raise `InputError` if it is missing, not text or not TOML."""
     text = read_text(path)
     try:
         return tomllib.loads(text)
@@ -90,17 +90,17 @@ def load_toml(path: str | Path) -> dict[str, Any]:
 
 
 def toml_problem(text: str, said: str) -> tuple[str, str]:
-    """Where and what is wrong with a text that `tomllib` refused saying `said`, in our words; and the line itself."""
+    """What is wrong, and where, with a text that `tomllib` rejected with the message `said`; and the line itself."""
     lines = text.rstrip("\n").split("\n")
     place = re.search(r"line (\d+), column (\d+)", said)
     number = min(int(place[1]) if place else len(lines), len(lines))
     where = f"line {number}, column {place[2]}" if place else f"line {number}, the last"
-    twice = ", says something a second time" if re.search("overwrite|twice|already", said) else ""
+    twice = ", defines a key a second time" if re.search("overwrite|twice|already", said) else ""
     return f"is not valid TOML: {where}{twice}", lines[number - 1].strip()
 
 
 def parse(model: type[M], data: dict[str, Any], *, file: str | Path | None = None) -> M:
-    """Validate `data` as `model`; raise `InputError` about the first thing wrong with it."""
+    """Validate `data` as `model`; raise `InputError` about the first error in it."""
     try:
         return model.model_validate(data)
     except pydantic.ValidationError as error:
@@ -108,25 +108,25 @@ def parse(model: type[M], data: dict[str, Any], *, file: str | Path | None = Non
 
 
 def load(model: type[M], path: str | Path) -> M:
-    """Read a TOML file as `model`; raise `InputError` about the first thing wrong with it."""
+    """Read a TOML file as `model`; raise `InputError` about the first error in it."""
     return parse(model, load_toml(path), file=path)
 
 
 def input_error(error: pydantic.ValidationError, *, file: str | Path | None = None, prefix: str = "") -> InputError:
-    """The first problem of a pydantic error as one line; a `prefix` makes options of fields."""
+    """The first problem of a pydantic error as one line; a `prefix` turns fields into options."""
     first = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in first["loc"]) or None
     message = first["msg"].removeprefix("Value error, ").removeprefix("Assertion failed, ")
     if first["type"] in SAID:
         message = SAID[first["type"]].format(**first.get("ctx", {}))
-    value = None if first["type"] == "told" else first["input"]  # whose message says it
+    value = None if first["type"] == "told" else first["input"]  # the message already has it
     if prefix and field:
         field = prefix + field.removeprefix("mission.").replace("_", "-")
     return InputError(message, file=file, field=field, value=value)
 
 
 def told(message: str) -> NoReturn:
-    """Raise an error for a pydantic validator whose message says which value is wrong."""
+    """Raise an error for a pydantic validator whose message already names the wrong value."""
     raise PydanticCustomError("told", "{message}", {"message": message})
 
 

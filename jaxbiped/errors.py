@@ -1,4 +1,4 @@
-"""The one exception that is meant for people: it becomes one line on stderr and exit status 2."""
+"""The one exception meant for people: it becomes one line on stderr and exit status 2."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class InputError(ValueError):
         super().__init__(" ".join(f"{place + ': ' if place else ''}{message}{got}".split()))
 
     def within(self, file: str | Path) -> InputError:
-        """The same of a value that came from a file."""
+        """The same error for a value that came from a file."""
         return InputError(self.message, file=file, field=self.field, value=self.value)
 
 
@@ -33,8 +33,8 @@ def _short(value: object, limit: int = 200) -> str:
 
 
 def _plain(value: object) -> object:
-    """Scalars and arrays of NumPy as Python's own, which people read: 0.5 and not np.float64(0.5)."""
-    np = sys.modules.get("numpy")  # where it was never loaded, nothing is its own
+    """NumPy scalars and arrays as plain Python values, which people can read: 0.5 and not np.float64(0.5)."""
+    np = sys.modules.get("numpy")  # if NumPy was never loaded, no value is its own
     if np is not None and isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     if type(value) in (tuple, list):

@@ -1,7 +1,7 @@
-"""Files that are either whole or not there: written beside their place, then moved into it. Texts and YAML, read.
+"""Files that are either complete or absent: written beside their final path, then moved. Also text and YAML input.
 
-What is being written is hidden, ends in `.part`, and is locked by its writer for as long as that lives. What a killed
-writer left is therefore known by its lock being free, and swept up by the next writer into the same place.
+A file being written is hidden, ends in `.part`, and is locked by its writer while that lives. What a killed writer left
+is recognised by its lock being free, and removed by the next writer to the same place.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from typing import Any, BinaryIO
 
 from jaxbiped.errors import InputError
 
-TRIES = 10  # to make a temporary file before anybody takes it for a dead writer's
+TRIES = 10  # attempts to create a temporary file before another process mistakes it for a dead writer's
 
 
 def write_whole(path: str | Path, write: Callable[[BinaryIO], object], *, parents: bool = False) -> None:
-    """Create or replace the file `path` with what `write(file)` writes, all of it or nothing.
+    """Create or replace the file `path` with what `write(file)` writes, completely or not at all.
 
     Args:
-      path: where the file shall be; its folder must exist, or is made with `parents`.
-      write: is given a binary file that is open for reading and writing.
+      path: path of the file; its folder must exist, or is created with `parents`.
+      write: called with a binary file that is open for reading and writing.
 
     Raises:
       InputError: the folder does not exist, is not writable, or the disk is full; nothing is left behind.
@@ -47,10 +47,10 @@ def write_whole(path: str | Path, write: Callable[[BinaryIO], object], *, parent
 
 @contextlib.contextmanager
 def new_folder(path: str | Path, field: str = "out") -> Iterator[Path]:
-    """A folder to fill, which takes the name `path` when the block ends well and is gone when it does not.
+    """A folder to fill, renamed to `path` if the block succeeds and removed if it does not.
 
     Args:
-      path: where the folder shall be; its parents are made, itself must not exist.
+      path: path of the folder, which must not exist; its parents are created.
       field: the option that names the folder, for messages.
 
     Yields:
@@ -72,7 +72,7 @@ def new_folder(path: str | Path, field: str = "out") -> Iterator[Path]:
 
 @contextlib.contextmanager
 def part(path: Path, make: Callable[[Path], object]) -> Iterator[Path]:
-    """What is to become `path`: made by `make` beside it, locked, and gone when the block ends, unless it was moved."""
+    """A temporary for `path`: created by `make` beside it, locked, and removed when the block ends unless moved."""
     sweep_up(path.parent, path.name)
     for _ in range(TRIES):
         temporary = path.with_name(f".{path.name}.{os.getpid()}-{secrets.token_hex(4)}.part")
@@ -82,9 +82,9 @@ def part(path: Path, make: Callable[[Path], object]) -> Iterator[Path]:
         except FileNotFoundError:
             if not path.parent.is_dir():
                 raise
-            continue  # swept up between being made and being locked
+            continue  # removed between being created and being locked
         try:
-            with contextlib.suppress(OSError):  # a file system without locks: then nobody sweeps up there, either
+            with contextlib.suppress(OSError):  # a file system without locks, where nobody removes leftovers either
                 fcntl.flock(descriptor, fcntl.LOCK_EX)
             if os.path.lexists(temporary):
                 yield temporary
@@ -92,14 +92,14 @@ def part(path: Path, make: Callable[[Path], object]) -> Iterator[Path]:
         finally:
             remove(temporary)
             os.close(descriptor)
-    raise FileExistsError(f"{path} is swept up by another process all the time")
+    raise FileExistsError(f"{path} keeps being removed by another process")
 
 
 def sweep_up(folder: Path, name: str | None = None) -> None:
-    """Remove what killed writers were writing into a folder; what a living one writes is locked, and left alone.
+    """Remove what killed writers left in a folder; files of living ones are locked, and left alone.
 
     Args:
-      name: of the file or folder that was being written; by default any.
+      name: name of the file or folder that was being written; by default any.
     """
     for scrap in folder.glob(f".{glob.escape(name) if name else '*'}.*.part"):
         with contextlib.suppress(OSError):
@@ -112,7 +112,7 @@ def sweep_up(folder: Path, name: str | None = None) -> None:
 
 
 def remove(path: Path) -> None:
-    """A file, or a folder with what is in it, as far as that can be removed."""
+    """Remove a file, or a folder with its content, as far as possible."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
     else:
@@ -121,28 +121,28 @@ def remove(path: Path) -> None:
 
 
 def refuse_existing(path: str | Path, field: str = "out") -> None:
-    """Raise `InputError` when `path` exists: results are never mixed or overwritten."""
+    """Raise `InputError` if `path` exists: results are never mixed or overwritten."""
     if os.path.lexists(path):
         raise InputError("must be a folder that does not exist yet", field=field, value=str(path))
 
 
 def reason(error: OSError) -> str:
-    """What the operating system says about `error`, without its numbers and file names."""
+    """The operating system's message about `error`, without numbers and file names."""
     return (error.strerror or str(error) or type(error).__name__).lower()
 
 
 def read_text(path: str | Path, *, otherwise: str | None = None) -> str:
-    r"""A text of somebody else's in UTF-8, without its byte order mark, its lines ended by \n.
+    r"""Read someone else's text file in UTF-8, without its byte order mark, with lines ended by \n.
 
     Lines end where an editor ends them, at \r\n, \n or \r, and nowhere else: `text.split("\n")` gives them, while
     `str.splitlines` would cut at U+2028 and others, which may be part of a name.
 
     Args:
       path: the file.
-      otherwise: the encoding of what is not UTF-8; None refuses it.
+      otherwise: the encoding to try for text that is not UTF-8; None rejects it.
 
     Raises:
-      InputError: no such file, one that cannot be read, or no text.
+      InputError: the file does not exist, cannot be read, or is not text.
     """
     try:
         content = Path(path).read_bytes()
@@ -160,7 +160,7 @@ def read_text(path: str | Path, *, otherwise: str | None = None) -> str:
 
 
 def read_yaml(path: str | Path) -> Any:
-    """What a YAML file holds; raises `InputError` when it is missing, no text or no YAML."""
+    """The content of a YAML file; raises `InputError` if it is missing, not text or not YAML."""
     import yaml
 
     text = read_text(path)
@@ -174,5 +174,5 @@ def read_yaml(path: str | Path) -> Any:
         yaml.YAMLError,
         ValueError,
         RecursionError,
-    ):  # no characters, dates or numbers; endless nesting
+    ):  # invalid characters, dates or numbers; endless nesting
         raise InputError("is not valid YAML", file=path) from None

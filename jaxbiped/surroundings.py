@@ -1,7 +1,7 @@
-"""What a user's shell and rc files set for other programs, kept from breaking ours or changing its results.
+"""Settings in the user's shell and rc files, kept from breaking the package or changing its results.
 
 Variables that say where to compute, what to keep on disk and what to log are respected. Those that change how JAX and
-Numba compute are overridden: rows are the same in every shell. What cannot be used is named in one line.
+Numba compute are overridden, so that rows are the same in every shell. Unusable values are reported in one line.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from jaxbiped.errors import InputError
 
-# By their whole names: devices; caches on disk; logs, dumps and tracebacks; processes of a cluster.
+# Full names: devices; caches on disk; logs, dumps and tracebacks; processes of a cluster.
 RESPECTED = re.compile(
     r"JAX_(PLATFORMS|PLATFORM_NAME|NUM_CPU_DEVICES|DEFAULT_DEVICE|\w+_VISIBLE_DEVICES|PJRT_\w+"
     r"|COMPILATION_CACHE_\w+|ENABLE_COMPILATION_CACHE|PERSISTENT_CACHE_\w+|RAISE_PERSISTENT_CACHE_ERRORS"
@@ -26,15 +26,15 @@ RESPECTED = re.compile(
     r"|NUMBA_(CACHE_DIR|DEBUG_CACHE)"
 )
 PREFIXES = ("JAX_", "NUMBA_")
-# What libraries read that we use: by these names an error of theirs is told from one of ours.
+# Prefixes of variables read by our libraries: they distinguish errors of the libraries from ours.
 READ = (*PREFIXES, "XLA_", "MUJOCO_", "PYOPENGL_", "MPL", "MATPLOTLIB", "POLARS_", "CUDA_", "TPU_", "PJRT_")
 OF_DEVICES = ("JAX_PLATFORMS", "JAX_PLATFORM_NAME", "JAX_NUM_CPU_DEVICES", "JAX_DEFAULT_DEVICE")
-PARSE_FLAGS = "from jaxlib import xla_client; xla_client.CompileOptions()"  # XLA ends a process whose flags are wrong
-FLAGS_TIME = 60.0  # [s] for that
-LOGGED = re.compile(r"^[EF]\d{4} \S+ +\d+ \S+\] (.*?)\.?$", re.MULTILINE)  # an error, as XLA logs it
+PARSE_FLAGS = "from jaxlib import xla_client; xla_client.CompileOptions()"  # XLA terminates a process with bad flags
+FLAGS_TIME = 60.0  # [s] time limit for that
+LOGGED = re.compile(r"^[EF]\d{4} \S+ +\d+ \S+\] (.*?)\.?$", re.MULTILINE)  # an error in XLA's log format
 
 
-# Set, not removed: of Numba a .numba_config.yaml of the working folder counts for what is not set.
+# Set, not removed: for unset variables, Numba reads a .numba_config.yaml in the working folder.
 SET = {"NUMBA_DISABLE_JIT": "0", "MPLBACKEND": "agg", "MATPLOTLIBRC": os.devnull}
 
 
@@ -43,7 +43,7 @@ def settled() -> Iterator[None]:
     """Override what would change our results or fail, in a block in which JAX, Numba and matplotlib are imported.
 
     Raises:
-      InputError: XLA would end this process for its flags, or a matplotlibrc of this folder is no text.
+      InputError: XLA would terminate this process for its flags, or a matplotlibrc in this folder is not text.
     """
     foreign = {name for name in os.environ if name.startswith(PREFIXES) and not RESPECTED.fullmatch(name)}
     before = {name: os.environ.pop(name, None) for name in foreign | SET.keys()}
@@ -52,7 +52,7 @@ def settled() -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.showwarning = tell
             if os.environ.get("PYTHONWARNINGS"):
-                warnings.resetwarnings()  # "error" would make an error of what any library warns of
+                warnings.resetwarnings()  # "error" would turn any library's warning into an error
                 warnings.simplefilter("default")
             check_matplotlibrc(Path("matplotlibrc"))
             if os.environ.get("XLA_FLAGS") and "jax" not in sys.modules:
@@ -65,13 +65,13 @@ def settled() -> Iterator[None]:
 
 
 def tell(message: Warning | str, category: type[Warning], filename: str, lineno: int, file=None, line=None) -> None:
-    """As `warnings.showwarning`, in one line and without the line of code."""
+    """Like `warnings.showwarning`, but in one line and without the line of code."""
     text = " ".join(str(message).split())
     print(f"jaxbiped: warning: {text}", file=sys.stderr if file is None else file)
 
 
 def check_matplotlibrc(file: Path) -> None:
-    """Raise `InputError` where matplotlib would fail to read its settings: it looks in the working folder first."""
+    """Raise `InputError` if matplotlib would fail to read its settings: it looks in the working folder first."""
     if file.is_file():
         try:
             file.read_text(encoding="utf-8")
@@ -82,18 +82,18 @@ def check_matplotlibrc(file: Path) -> None:
 
 
 def check_flags(flags: str) -> None:
-    """Raise `InputError` where XLA does not know its flags, as it says in a process of its own."""
+    """Raise `InputError` if XLA rejects its flags, as tested in a separate process."""
     try:
         command = [sys.executable, "-c", PARSE_FLAGS]
         run = subprocess.run(command, check=False, capture_output=True, text=True, timeout=FLAGS_TIME)
     except (OSError, subprocess.SubprocessError):
-        return  # then XLA has to say it
+        return  # then XLA has to report it
     if run.returncode and (said := LOGGED.search(run.stderr)):
         raise InputError(f"cannot be used: {said[1]}", field="XLA_FLAGS", value=flags)
 
 
 def check_devices() -> None:
-    """Raise `InputError` where JAX finds no devices, with the variable that says which it is to use."""
+    """Raise `InputError` if JAX finds no devices, with the variable that selects them."""
     import jax
 
     try:
@@ -102,12 +102,12 @@ def check_devices() -> None:
         asked = next((name for name in OF_DEVICES if os.environ.get(name)), None)
         if asked is None:
             raise
-        said = first_line(error) or "there is no such device here"
+        said = first_line(error) or "no such device here"
         raise InputError(f"no devices: {said}", field=asked, value=os.environ[asked]) from None
 
 
 def culprit(error: Exception) -> InputError | None:
-    """The one line about a variable that an error of a library names; None where it names none that is set."""
+    """The one-line error about a variable named in a library's error; None if it names none that is set."""
     said = first_line(error)
     for name, value in os.environ.items():
         if name.startswith(READ) and value and re.search(rf"\b{name}\b", said, re.IGNORECASE):
@@ -116,5 +116,5 @@ def culprit(error: Exception) -> InputError | None:
 
 
 def first_line(error: Exception) -> str:
-    """What an error says, without what follows its first line."""
+    """The first line of an error's message."""
     return (str(error).strip().splitlines() or [""])[0]

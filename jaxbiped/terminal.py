@@ -1,8 +1,8 @@
-"""What a command prints to: streams that never stop it, whatever becomes of the terminal.
+"""Output streams of a command: they never stop it, whatever happens to the terminal.
 
-A reader that goes away, a full disk, a closed descriptor or an encoding without our signs must not cost a result that
-took hours. So standard output and standard error are replaced by streams that swallow what cannot be written, and the
-command line says at its end what was lost.
+A reader that goes away, a full disk, a closed descriptor or an encoding that lacks our symbols must not cost a result
+that took hours. So standard output and standard error are replaced by streams that swallow what cannot be written, and
+the command line reports at the end what was lost.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from typing import Any
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
 
-# Signs that we print, for encodings that lack them. Letters lose their accents; what is left becomes a question mark.
+# Symbols that we print, for encodings that lack them. Letters lose their accents; all others become question marks.
 ASCII = str.maketrans(
     {
         "×": "x", "−": "-", "–": "-", "—": "-", "±": "+-", "°": " deg", "·": "*", "→": "->", "←": "<-",
@@ -30,13 +30,13 @@ ASCII = str.maketrans(
         "“": '"', "”": '"', "‘": "'", "’": "'", "─": "-", "━": "=", "│": "|", "╭": "+", "╮": "+", "╰": "+", "╯": "+",
     }
 )  # fmt: skip
-NARROWEST = 40  # [columns] in narrower ones text is not legible, and tyro never ends to wrap it
+NARROWEST = 40  # [columns] narrower text is not legible, and tyro never stops wrapping it
 PLAIN = "jaxbiped.plain"  # name of the handler of encoding errors
 ENDING = {signal.SIGTERM: "terminated", **({signal.SIGHUP: "terminal closed"} if hasattr(signal, "SIGHUP") else {})}
 
 
 def plain(error: UnicodeError) -> tuple[str, int]:
-    """What stands for characters that an encoding does not have."""
+    """The replacement for characters that an encoding lacks."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     text = unicodedata.normalize("NFKD", error.object[error.start : error.end].translate(ASCII))
@@ -48,11 +48,11 @@ codecs.register_error(PLAIN, plain)
 
 
 class Sink:
-    """A text stream whose `write` and `flush` never fail: from the first error on, it swallows what it is given."""
+    """A text stream whose `write` and `flush` never fail: after the first error it swallows everything."""
 
     def __init__(self, stream: Any):
         self.stream = stream
-        self.error: OSError | ValueError | None = None  # the first; of a closed file it is a ValueError
+        self.error: OSError | ValueError | None = None  # the first one; a ValueError for a closed file
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.stream, name)
@@ -83,14 +83,14 @@ class Sink:
             silence(self.stream)
 
     def problem(self) -> InputError | None:
-        """The one line about what could not be written; none where the reader only had enough of it."""
+        """The error about what could not be written; None if the reader merely stopped reading."""
         if isinstance(self.error, OSError) and not isinstance(self.error, BrokenPipeError):
             return InputError(f"cannot be written: {reason(self.error)}", field="standard output")
         return None
 
 
 def silence(stream: Any) -> None:
-    """Let what a stream still holds, and whatever comes, go nowhere, so that Python can close it without an error."""
+    """Discard what a stream still holds and all that follows, so that Python can close it without an error."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -100,10 +100,10 @@ def silence(stream: Any) -> None:
 
 @contextlib.contextmanager
 def lasting_streams() -> Iterator[Sink]:
-    """Standard output and standard error as `Sink`s, in encodings that can print everything.
+    """Replace standard output and standard error by `Sink`s, in encodings that can print everything.
 
     Yields:
-      That of standard output, flushed and told of its errors when the block ends.
+      That of standard output, flushed and with its errors recorded when the block ends.
     """
     keep_descriptors()
     before, sinks, errors = (sys.stdout, sys.stderr), [], []
@@ -115,7 +115,7 @@ def lasting_streams() -> Iterator[Sink]:
             if hasattr(stream, "reconfigure"):
                 stream.reconfigure(errors=PLAIN)
             with contextlib.suppress(OSError, ValueError, AttributeError):
-                os.set_blocking(stream.fileno(), True)  # else a slow reader is an error
+                os.set_blocking(stream.fileno(), True)  # otherwise a slow reader causes an error
             sinks.append(Sink(stream))
         sys.stdout, sys.stderr = sinks
         try:
@@ -132,7 +132,7 @@ def lasting_streams() -> Iterator[Sink]:
 
 @contextlib.contextmanager
 def wide_enough() -> Iterator[None]:
-    """Let a terminal count as at least `NARROWEST` wide."""
+    """Treat a terminal as at least `NARROWEST` wide."""
     asked = os.environ.get("COLUMNS")
     if shutil.get_terminal_size().columns >= NARROWEST:
         yield
@@ -146,16 +146,16 @@ def wide_enough() -> Iterator[None]:
 
 
 def keep_descriptors() -> None:
-    """Open what is closed of descriptors 0 to 2, or the next file opened would get what others print."""
+    """Open those of descriptors 0 to 2 that are closed; otherwise the next file opened would receive printed output."""
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest one that is free
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free descriptor
 
 
 def command_line() -> str:
-    """That of this process, for people to repeat."""
+    """The command line of this process, for people to repeat."""
     return legible(shlex.join(["jaxbiped", *sys.argv[1:]]))
 
 
@@ -169,14 +169,14 @@ class Terminated(KeyboardInterrupt):
 
     def __init__(self, number: int):
         super().__init__(ENDING[signal.Signals(number)])
-        self.status = 128 + number  # as of a process that the signal killed
+        self.status = 128 + number  # as for a process killed by the signal
 
 
 @contextlib.contextmanager
 def ended_by_signals() -> Iterator[None]:
-    """Raise `Terminated` in the main thread when this process is asked to end; a second time it ends at once.
+    """Raise `Terminated` in the main thread when this process is asked to end; a second request ends it at once.
 
-    A signal that is ignored (`nohup`), or that has a handler already, is left alone.
+    A signal that is ignored (`nohup`) or already has a handler is left alone.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

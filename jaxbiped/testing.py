@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def tiny_mission(planner: Any = "full") -> PlayedMission:
-    """A mission of 40 cm past one block, which every run plays alike: perfect sight, nominal steps, no noise.
+    """A mission of 40 cm past one block, identical in every run: perfect sensing, nominal steps, no noise.
 
     With the package's cache warm it takes under two seconds, most of it JAX.
 
@@ -26,7 +26,7 @@ def tiny_mission(planner: Any = "full") -> PlayedMission:
 
 @cache
 def tiny_scene():
-    """Its arena."""
+    """The arena of `tiny_mission`."""
     import jaxbiped as jb
 
     block = jb.Box(centre=(0.45, 0.40), size=(0.08, 0.10), top=0.3)

@@ -1,1 +1,1 @@
-"""What sweep scripts are written with: studies, their results, and single missions."""
+"""The interface for sweep scripts: studies, their results, and single missions."""

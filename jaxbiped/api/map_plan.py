@@ -1,4 +1,4 @@
-"""One path on one map, without a mission around it."""
+"""A path on a map, without a mission around it."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from jaxbiped.planning.costs import Costs, Rules
 
 @dataclass(frozen=True)
 class PlannedPath:
-    """The path of least cost between two cells."""
+    """The path of lowest cost between two cells."""
 
     cells_ij: Int[np.ndarray, "n 2"]  # from the start to the goal
-    points_xy: Float[np.ndarray, "n 2"]  # [m] their centres
+    points_xy: Float[np.ndarray, "n 2"]  # [m] the cells' centres
     cost: float  # by Eq. 1
 
     @property
     def length(self) -> float:
-        """[m] between the centres."""
+        """[m] Length between the centres."""
         return float(np.linalg.norm(np.diff(self.points_xy, axis=0), axis=1).sum())
 
 
@@ -34,12 +34,12 @@ def plan(
     costs: Costs | None = None,
     rules: Rules | None = None,
 ) -> PlannedPath | None:
-    """The path of least cost by Eq. 1 on a class grid; None where there is none.
+    """The path of lowest cost by Eq. 1 on a class grid; None if there is none.
 
     Args:
       start_xy, goal_xy: [m] in the grid's frame.
-      costs: on a pitch of 5 cm, the paper's by default; they are brought to the grid's own.
-      rules: what may be done; by default all but cutting corners.
+      costs: costs on a pitch of 5 cm, by default the paper's; they are converted to the grid's pitch.
+      rules: allowed moves; by default all except cutting corners.
 
     Raises:
       InputError: a point outside the map or on an obstacle.

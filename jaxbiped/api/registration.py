@@ -1,4 +1,4 @@
-"""Names for what people bring: strategies and planners, families of arenas, sensors, executors and metrics."""
+"""Names for users' components: strategies and planners, families of arenas, sensors, executors and metrics."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ KINDS = (
 
 
 def register(thing: Any, name: str | None = None, *, replace: bool = False) -> str:
-    """Give something of yours a name that commands, studies and tables know it by.
+    """Register a component under a name that commands, studies and tables can use.
 
     Args:
       thing: a `Strategy`, a `Planner`, a planning function of NumPy arrays, a `Family`, a `Sensor`, an `Executor` or a
         `Metric`.
       name: by default its own, or that of its class: `slow_walk` of `SlowWalk` for sensors, executors and metrics.
-      replace: whether it may take the place of another one that is not built in.
+      replace: whether it may replace a component that is not built in.
 
     Returns:
       The name.
 
     Raises:
-      InputError: a name that is taken, or cannot be one.
+      InputError: a name that is taken or invalid.
     """
     if isinstance(thing, Family):
         made = thing if name is None else replaced(thing, name=name)
@@ -56,25 +56,25 @@ def register(thing: Any, name: str | None = None, *, replace: bool = False) -> s
 
 
 def add(registry: Registry, base: type, built_in: tuple[str, ...], thing: Any, name: str, replace: bool) -> str:
-    """Put a component into its registry."""
+    """Add a component to its registry."""
     if not NAME.fullmatch(name):
         message = "must begin with a letter and have at most 40 letters, digits and . _ + -"
         raise InputError(message, field=f"name of a {registry.kind}", value=name)
     if name in built_in and name not in registry:  # one that runs on the host
-        raise InputError("is taken by one that is built in", field="name", value=name)
+        raise InputError("is taken by a built-in one", field="name", value=name)
     made = as_metric(thing, name) if base is Metric else as_component(thing, base, f"{registry.kind} {name}")
     registry.add(name, made, replace=replace and name not in built_in)
     return name
 
 
 def snake_case(thing: Any) -> str:
-    """`slow_walk` of an object of the class `SlowWalk`, or of the class."""
+    """`slow_walk` for an object of the class `SlowWalk`, or for the class."""
     kind = thing if isinstance(thing, type) else type(thing)
     return column_of(f":{kind.__name__}")
 
 
 def family_name(family: Any) -> str:
-    """The name of a family in the registry; a generator is registered under its own."""
+    """The name of a family in the registry; a generator is registered under its own name."""
     if isinstance(family, str | Path):
         return str(family)
     own = family if isinstance(family, Family) else as_family(family, getattr(family, "__name__", "own"))
@@ -82,7 +82,7 @@ def family_name(family: Any) -> str:
 
 
 def named(thing: Any) -> Strategy:
-    """A strategy of something that stands for one, under its own name."""
+    """The strategy of a planner, function or strategy, under its own name."""
     if isinstance(thing, Strategy):
         return thing
     own = getattr(thing, "function", None) or thing

@@ -1,4 +1,4 @@
-"""What a study found: its rows, and what can be asked of them."""
+"""The results of a study: its rows, and what can be computed from them."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ if TYPE_CHECKING:
 
 
 class Kept(Model):
-    """A config as it was stored: nothing in it is looked up, so that nothing is imported."""
+    """A config as it was stored: names in it are not looked up, so nothing is imported."""
 
     model_config = pydantic.ConfigDict(extra="allow", frozen=True)
 
 
 @dataclass(frozen=True)
 class Table:
-    """Tables and sentences that show themselves: as text, in a terminal, and as HTML in a notebook."""
+    """Tables and sentences that display themselves: as text, in a terminal, and as HTML in a notebook."""
 
-    what: Callable[[], Any]  # makes a renderable of rich
+    what: Callable[[], Any]  # makes a Rich renderable
 
     def __rich__(self):
         return self.what()
 
     def text(self, html: bool = False, width: int = 100) -> str:
-        """The same as text or as HTML."""
+        """The content as text or as HTML."""
         from rich.console import Console
 
         console = Console(file=io.StringIO(), record=True, width=width, force_jupyter=False)
@@ -66,7 +66,7 @@ class Table:
 class Compared(Table):
     """Paired statistics of strategies at one sweep point."""
 
-    statistics: Comparison | None = None  # the numbers that the tables show
+    statistics: Comparison | None = None  # the numbers in the tables
 
 
 @dataclass(frozen=True)
@@ -74,15 +74,15 @@ class Results:
     """The rows of a study or a sweep."""
 
     rows: pl.DataFrame  # of `statistics.schema.SCHEMA`: one for each sweep point, arena and strategy
-    points: pl.DataFrame  # `point`, and a column for each field that is swept
-    config: dict[str, Any]  # of the study, as it is stored
+    points: pl.DataFrame  # `point`, and a column for each swept field
+    config: dict[str, Any]  # config of the study, as stored
     folder: Path | None = None  # where it is stored
     own: tuple[Strategy, ...] = ()  # strategies that are not built in
-    shown: Mapping[str, MetricFormat] = field(default_factory=dict)  # how numbers of metrics are shown
+    shown: Mapping[str, MetricFormat] = field(default_factory=dict)  # how numbers of metrics are displayed
 
     @classmethod
     def of(cls, rows: pl.DataFrame, points: pl.DataFrame, config: StudyConfig, own: Sequence[Strategy]) -> Results:
-        """Of rows in any order."""
+        """Make results from rows in any order."""
         rank = pl.col("strategy").cast(pl.Enum(ordered(rows["strategy"].unique())))
         return cls(
             rows=validate(rows).sort("point", "arena", rank),
@@ -94,26 +94,26 @@ class Results:
 
     @property
     def strategies(self) -> tuple[str, ...]:
-        """Their names, in the order of tables."""
+        """Names of the strategies, in the order of tables."""
         return ordered(self.rows["strategy"].unique())
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The fields that are swept."""
+        """The swept fields."""
         return tuple(name for name in self.points.columns if name != "point")
 
     def compare(
         self, first: str | None = None, second: str | None = None, *, point: int = 0, resamples: int = 4999
     ) -> Compared:
-        """Two strategies on the same arenas: success, distance and time, with intervals and corrected p-values.
+        """Compare two strategies on the same arenas: success, distance and time, with intervals and corrected p-values.
 
         Args:
           first, second: differences are first minus second; by default all usual pairs.
           point: sweep point.
-          resamples: of the bootstraps.
+          resamples: resamples of the bootstraps.
 
         Raises:
-          InputError: a strategy or a point that is not there, or one strategy twice.
+          InputError: a strategy or a point that does not exist, or the same strategy twice.
         """
         for side, name in (("first", first), ("second", second)):
             if name is not None and name not in self.strategies:
@@ -132,7 +132,7 @@ class Results:
         return Compared(shown, found)
 
     def summary(self) -> Table:
-        """Each strategy by itself, or success at each point of a sweep."""
+        """Each strategy alone, or success at each point of a sweep."""
         if not self.axes:
             return self.compare()
 
@@ -154,14 +154,14 @@ class Results:
         return pointwise(self.rows, self.points, self.config, seed=self.config["seed"])
 
     def plot(self, metric: str = "success") -> Figure:
-        """Each strategy's own metric with intervals, over the axis of a sweep or side by side.
+        """Plot each strategy's own metric with intervals, over the axis of a sweep or side by side.
 
         Args:
           metric: success, distance, time, or the column of another metric; distance and time are means over a
             strategy's own reached missions.
 
         Raises:
-          InputError: another metric; a sweep of several fields.
+          InputError: an unknown metric; a sweep of several fields.
         """
         known = (*MEASURES, *metric_columns(self.rows))
         if metric not in known:
@@ -175,7 +175,7 @@ class Results:
         return own_metric(self.rows, self.points, metric, shown=self.shown)
 
     def save(self, folder: str | Path) -> Path:
-        """Store the rows in a new folder, as a study stores them; `jaxbiped report FOLDER` draws its page.
+        """Store the rows in a new folder, in the form of a study; `jaxbiped report FOLDER` draws its page.
 
         Raises:
           InputError: a folder that exists, a full disk.
@@ -186,17 +186,17 @@ class Results:
         ) as results:
             numbered = self.rows.with_columns(
                 (pl.col("arena") // self.config["shard"]).alias("_block")
-            )  # no metric's name
+            )  # not the name of a metric
             for block in numbered.partition_by("_block", include_key=False, maintain_order=True):
                 results.append(block)
             results.finish()
         return Path(folder)
 
     def replay(self, strategy: str, arena: int, point: int = 0):
-        """One mission of the study played again, with its log.
+        """Replay one mission of the study, with its log.
 
         Raises:
-          InputError: a strategy, arena or point that is not there; a strategy whose code is not what it was.
+          InputError: a strategy, arena or point that does not exist; a strategy whose code has changed.
         """
         from jaxbiped.api.single_mission import PlayedMission
         from jaxbiped.study.manifest import Manifest

@@ -1,4 +1,4 @@
-"""The functions of a sweep script that evaluate studies, and read them again."""
+"""The functions of a sweep script that evaluate studies, and load them again."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ def evaluate(
     """Play every strategy on every arena of a study.
 
     Args:
-      out: folder to store the rows in, shard by shard; by default they are kept in memory alone (see `Results.save`).
+      out: folder to store the rows in, shard by shard; by default they are only kept in memory (see `Results.save`).
         A study that was stopped there is resumed.
-      on_progress: called now and then.
+      on_progress: called from time to time.
 
     Raises:
-      InputError: something that cannot be run on this machine, or a folder that holds something else.
+      InputError: something that cannot run on this machine, or a folder that holds something else.
     """
     return _evaluated(study, None, out, on_progress)
 
@@ -42,18 +42,18 @@ def sweep(
     out: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> Results:
-    """The same at every combination of values: `{"costs.c3": [2, 5, 10], "planner.clearance": [0, 0.1]}`.
+    """Evaluate a study at every combination of values: `{"costs.c3": [2, 5, 10], "planner.clearance": [0, 0.1]}`.
 
     Args:
       axes: dotted fields of the mission's config, `population.<field>`, or `planner.<field>`, `sensor.<field>` and
         `executor.<field>` of your own.
-      out, on_progress: as of `evaluate`.
+      out, on_progress: as for `evaluate`.
 
     Raises:
-      InputError: as `evaluate`; a field that is not there, or a value that it does not allow.
+      InputError: as for `evaluate`; a field that does not exist, or a value that it does not allow.
     """
     if not axes:
-        raise InputError("must name one field at least", field="axes")
+        raise InputError("must name at least one field", field="axes")
     return _evaluated(study, dict(axes), out, on_progress)
 
 
@@ -71,13 +71,13 @@ def _evaluated(study: Study, axes, out, on_progress) -> Results:
 
 
 def load(folder: str | Path, own: Sequence[Strategy | Planner] = ()) -> Results:
-    """What a study stored in a folder, by this or by the command line; nothing that it names is imported.
+    """The results that a study stored in a folder, from Python or the command line; nothing is imported by name.
 
     Args:
-      own: strategies of the study that are not built in, where missions are to be played again.
+      own: strategies of the study that are not built in, needed to replay their missions.
 
     Raises:
-      InputError: no results folder, or a damaged one.
+      InputError: not a results folder, or a damaged one.
     """
     frame, manifest = store.read(folder)
     return Results(

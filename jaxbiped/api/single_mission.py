@@ -1,4 +1,4 @@
-"""Single missions of a sweep script."""
+"""Single missions in a sweep script."""
 
 from __future__ import annotations
 
@@ -28,17 +28,17 @@ class PlayedMission:
 
     @property
     def code(self) -> str:
-        """How it ended: "reached", say."""
+        """How it ended, such as "reached"."""
         return self.mission.code.label
 
     @property
     def distance(self) -> float:
-        """[m] walked."""
+        """[m] Distance walked."""
         return self.mission.distance
 
     @property
     def time(self) -> float:
-        """[s] taken."""
+        """[s] Time taken."""
         return self.mission.time
 
     @property
@@ -54,7 +54,7 @@ class PlayedMission:
         )
 
     def save(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write `map.png`, `mission.gif`, `mission.json` and the log into a new folder; the files.
+        """Write `map.png`, `mission.gif`, `mission.json` and the log into a new folder; return the files.
 
         Raises:
           InputError: a folder that exists or cannot be written.
@@ -83,7 +83,7 @@ def play(
     seed: int = 0,
     on_decision: Callable[[Played], None] = lambda _: None,
 ) -> PlayedMission:
-    """One mission in a scene, with a log of everything.
+    """Play one mission in a scene, with a log of everything.
 
     Consumes `jax.random.key(seed)`.
 
@@ -92,7 +92,7 @@ def play(
       strategy: a name, or a strategy, planner or function of your own.
 
     Raises:
-      InputError: a scene that is wrong, a strategy that is not known, something that cannot be run on this machine.
+      InputError: a bad scene, an unknown strategy, something that cannot run on this machine.
     """
     if isinstance(scene, SceneConfig):
         name, arena = scene.name, replace(to_arena(scene), terrain=to_terrain(scene, Path()))

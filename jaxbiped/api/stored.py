@@ -18,16 +18,16 @@ def compare(
     second_point: int | None = None,
     resamples: int = 4999,
 ) -> Compared:
-    """Two strategies or sweep points of one study, or the same of two, on the arenas that both have.
+    """Compare two strategies or sweep points, of one study or of two, on the arenas that both have.
 
     Args:
-      results, others: results, or folders of them; of one study, or of two with the same seed and families.
+      results, others: results, or their folders; from one study, or from two with the same seed and families.
       first, second: strategies; differences are first minus second. By default the first study's.
       first_point, second_point: sweep points, by default 0 and that of the first side.
-      resamples: of the bootstraps.
+      resamples: resamples of the bootstraps.
 
     Raises:
-      InputError: no results, other arenas, a strategy or point that is not there, or twice the same.
+      InputError: no results, other arenas, a strategy or point that does not exist, or the same side twice.
     """
     stored = [as_stored(item) for item in (results, others) if item is not None]
     sides = choose(stored, (first, second), (first_point, second_point))
@@ -45,7 +45,7 @@ def compare(
 
 
 def as_stored(results: Results | str | Path) -> Stored:
-    """Results as a folder that was read."""
+    """Results in the form of a folder that was read."""
     if not isinstance(results, Results):
         return open_stored(results)
     from jaxbiped.study.manifest import Manifest

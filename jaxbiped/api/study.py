@@ -1,4 +1,4 @@
-"""A study as a sweep script states it: arenas, strategies, and one kind of mission."""
+"""A study as written in a sweep script: arenas, strategies, and one kind of mission."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from jaxbiped.study.sweep import SweepConfig
 
 @dataclass(frozen=True)
 class RandomArenas:
-    """Arenas drawn from families that take turns; arena k of a seed is always the same one.
+    """Arenas drawn from families that take turns; arena k of a seed is always the same.
 
     Args:
       families: names of families, scene files (.toml), generators of your own (functions of a random key that return
         an `Arena`, in JAX), or `Family` objects.
-      count: of arenas.
-      population: what is fixed of families that are built in.
+      count: number of arenas.
+      population: measures that are fixed for built-in families.
     """
 
     families: Sequence[str | Path | Family | Any] = FAMILIES
@@ -50,7 +50,7 @@ def Scenes(files: str | Path | Sequence[str | Path], count: int | None = None) -
 
     Args:
       files: a folder, or scene files.
-      count: of arenas; more than there are scenes: each again, with other noise. By default one each.
+      count: number of arenas; if larger than the number of scenes, scenes repeat with other noise. By default one each.
 
     Raises:
       InputError: a folder without scenes.
@@ -68,18 +68,18 @@ class Study:
 
     Args:
       arenas: where missions take place.
-      strategies: names, `Strategy` objects, planners (which dare all, under the name of their class), or functions
-        of NumPy arrays (see `HostPlanner`, under their own name).
+      strategies: names, `Strategy` objects, planners (allowed to cross everything, under the name of their class), or
+        functions of NumPy arrays (see `HostPlanner`, under their own name).
       mission: robot, sensor, executor, costs and so on, the same for all strategies.
       seed: of the arenas and of all noise.
-      metrics: columns beside those that all rows have: names, or metrics of your own, under the name of their class.
-      sensor, executor: in place of the mission's: names, or objects of your own, under the name of their class. What
-        depends on them and is not given is filled in: `robot.radius` is 0.125 m for all executors but `kinematic`.
+      metrics: additional columns: names, or metrics of your own, under the name of their class.
+      sensor, executor: replace the mission's: names, or objects of your own, under the name of their class. Fields that
+        depend on them and are not given are filled in: `robot.radius` is 0.125 m for all executors but `kinematic`.
 
-      numbers: of components, in place of those that they have: `{"sensor.reach": 0.5}`.
+      numbers: numbers of components, instead of their defaults: `{"sensor.reach": 0.5}`.
 
     Raises:
-      InputError: a name that is not known, two strategies of one name, a number out of its range.
+      InputError: an unknown name, two strategies with one name, a number out of its range.
     """
 
     arenas: RandomArenas = field(default_factory=RandomArenas)
@@ -90,7 +90,7 @@ class Study:
     sensor: str | Sensor | None = None
     executor: str | Executor | None = None
     numbers: Mapping[str, float] = field(default_factory=dict)
-    shard: int = 1024  # arenas that are computed, and stored, together
+    shard: int = 1024  # arenas that are computed and stored together
     own: tuple[Strategy, ...] = field(init=False, repr=False)
 
     def __post_init__(self):
@@ -103,10 +103,10 @@ class Study:
         check_numbers(config.numbers, config.mission, strategies_of(config))
 
     def config(self, axes: Mapping[str, Sequence[float | int]] | None = None) -> StudyConfig:
-        """The config that a command line would have; its strategies are registered.
+        """The config that a command line would produce; its strategies are registered.
 
         Args:
-          axes: of a sweep: dotted fields, each with its values; every combination is a point.
+          axes: axes of a sweep: dotted fields, each with its values; every combination is a point.
         """
         for item in self.own:
             STRATEGIES.add(item.name, item, replace=item.name not in BUILT_IN)
@@ -130,12 +130,12 @@ class Study:
         return fingerprinted(config)
 
     def _mission(self) -> dict[str, Any]:
-        """The mission's config; with another sensor or executor, what depends on these is filled in anew."""
+        """The mission's config; with another sensor or executor, fields that depend on these are filled in again."""
         own = self._seen_and_moved()
         return self.mission.model_dump(exclude_unset=True) | own if own else self.mission.model_dump()
 
     def _seen_and_moved(self) -> dict[str, str]:
-        """Names of the sensor and the executor, where they are not the mission's."""
+        """Names of the sensor and the executor, if they are not the mission's."""
         own = {"sensor": self.sensor, "executor": self.executor}
         return {
             kind: item if isinstance(item, str) else register(item, replace=True) for kind, item in own.items() if item
@@ -160,7 +160,7 @@ class Study:
 
 
 def metric_name(thing: Any) -> str:
-    """The name of a metric, or of a class of metrics, which is registered; `InputError` for anything else."""
+    """The name of a metric or a class of metrics, which is registered; `InputError` for anything else."""
     if isinstance(thing, Metric) or (isinstance(thing, type) and issubclass(thing, Metric)):
         return register(thing, replace=True)
     raise InputError("must be a name, or a Metric or its class", field="metrics", value=thing)

@@ -1,4 +1,4 @@
-"""The world that a robot is put into."""
+"""The world in which a robot is placed."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ DISC_RADIUS, SQUARE_SIDE = 0.075, 0.05  # [m] (paper, 3.1)
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Landmarks:
-    """`L` landmark slots, flat on the floor, whose place is known to the robot (paper, 2, condition 2)."""
+    """`L` landmark slots, flat on the floor, at positions known to the robot (paper, 2, condition 2)."""
 
     x: Float[Array, "*B L"]  # [m]
     y: Float[Array, "*B L"]  # [m]
-    yaw: Float[Array, "*B L"]  # [rad]; of no meaning for a circle
+    yaw: Float[Array, "*B L"]  # [rad]; meaningless for a circle
     kind: Int[Array, "*B L"]  # CIRCLE or SQUARE
     used: Bool[Array, "*B L"]
 
@@ -32,7 +32,7 @@ class Landmarks:
 class Arena:
     """One arena: boxes, terrain, landmarks, start and goal.
 
-    The floor is the rectangle [0, size_x] x [0, size_y] at z = 0, but where the terrain lies, which is there instead.
+    The floor is the rectangle [0, size_x] x [0, size_y] at z = 0, except where terrain replaces it.
     """
 
     size_xy: Float[Array, "*B 2"]  # [m]
@@ -43,5 +43,5 @@ class Arena:
     floor_contrast: Float[Array, "*B"]  # texture contrast of the floor, 0 to 1
     family: Int[Array, "*B"]  # index into `families.KNOWN`; -1 for a scene written by hand
     difficulty: Float[Array, "*B"]  # 0 (easy) to 1 (hard)
-    movers: Movers | None = None  # None: all boxes stand
+    movers: Movers | None = None  # None: all boxes stand still
     terrain: HeightField | None = None  # None: flat floor. In a hole there is no ground

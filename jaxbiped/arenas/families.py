@@ -1,4 +1,4 @@
-"""Random arenas: six families that stand still and one that moves, each with a difficulty from 0 (easy) to 1 (hard).
+"""Random arenas: six static families and one with moving boxes, each with a difficulty from 0 (easy) to 1 (hard).
 
 Every family lays its boxes out between a start on the left and a goal on the right of the area of the
 paper's experiments (180 x 140 cm; paper, 3.1). Arena k is a pure function of (key, k): the same in
@@ -22,22 +22,22 @@ from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes, footprint_extent, plan_distance
 
-FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")  # that stand still
+FAMILIES = ("obstacles", "bump", "stairs", "gate", "mixed", "clutter")  # static families
 MOVING = ("traffic",)
 KNOWN = FAMILIES + MOVING
 
 MAX_BOXES = 12  # slots; every family fits
-DRAWS = 12  # rows of `MAX_BOXES` random numbers an arena
+DRAWS = 12  # rows of `MAX_BOXES` random numbers per arena
 SIZE_X, SIZE_Y = 1.80, 1.40  # [m]
 BUMP = 0.03  # [m] one step of the robot (paper, Table 2)
 LINTEL = 0.37  # [m] clearance of a gate (paper, Table 2)
 TALL = 0.50  # [m] higher than the camera
 WALKERS = 4
-TRAFFIC_X = 0.18  # [m] from the middle to both sides, where blocks move: clear of start and goal
-TRAFFIC_SPEED = 0.02  # [m/s] greatest; the robot itself goes 2 mm/s, measurements included
+TRAFFIC_X = 0.18  # [m] range of moving blocks to both sides of the middle: clear of start and goal
+TRAFFIC_SPEED = 0.02  # [m/s] greatest; the robot itself moves at 2 mm/s, including measurements
 CLEARANCE = 0.22  # [m] kept free of obstacles around the start and the goal
 
-# Discs and squares beside the way and behind the goal: from most poses that look towards the goal, two are in view.
+# Discs and squares beside the path and behind the goal: from most poses facing the goal, two are in view.
 LANDMARKS_X = (0.55, 0.55, 1.05, 1.05, 1.70, 1.70)
 LANDMARKS_Y = (0.12, 1.28, 0.12, 1.28, 0.35, 1.05)
 LANDMARKS_KIND = (SQUARE, SQUARE, CIRCLE, CIRCLE, CIRCLE, CIRCLE)
@@ -51,18 +51,18 @@ def sample(
     population: Population | None = None,
     turn: Int[Array, ""] | None = None,
 ) -> Arena:
-    """Arena `index` of the population that `key` names.
+    """Arena `index` of the population determined by `key`.
 
     Consumes `fold_in(key, index)`, never `key` itself. Families take turns (`index` modulo their number), so that
     strata are balanced in every block of arenas; difficulty is uniform on [0, 1].
 
     Args:
       families: static; which families take turns.
-      population: what is fixed and not drawn; all else of the arena stays as it is.
-      turn: which of the families it is; by default `index` modulo their number.
+      population: measures that are fixed and not drawn; everything else in the arena stays the same.
+      turn: index of its family; by default `index` modulo their number.
 
     Raises:
-      InputError: something that is not a key, an index below 0, no family, or an unknown one.
+      InputError: not a key, an index below 0, no family, or an unknown one.
     """
     checks.integers("index", index, between=(0, np.iinfo(np.int32).max))
     unknown = [name for name in families if name not in LAYOUTS]
@@ -76,7 +76,7 @@ def sample(
     start = jnp.array([0.25, 0.70, 0.0]) + (2 * u[0, 1:4] - 1) * jnp.array([0.05, 0.20, 0.26])
     goal = jnp.array([1.45, 0.70]) + (2 * u[0, 4:6] - 1) * jnp.array([0.05, 0.20])
     middle = (start[:2] + goal) / 2
-    fixed = {"bump": {"population": population}}  # the one family that has something to fix
+    fixed = {"bump": {"population": population}}  # the only family with measures to fix
     layouts = [LAYOUTS[name](u[4:], difficulty, middle, **fixed.get(name, {})) for name in families]
     boxes = replace(jax.tree.map(lambda *leaves: jnp.stack(leaves)[turn], *layouts), contrast=0.5 + 0.5 * u[1])
     boxes = _keep_ends_free(_keep_inside(boxes), start[:2], goal)
@@ -110,7 +110,7 @@ def _boxes(x, y, yaw, half_x, half_y, bottom, top, used=True) -> Boxes:
 
 
 def _obstacles(u, difficulty, middle, slots: int = 6) -> Boxes:
-    """2 to `slots` blocks, half of them lower than the camera and half taller, the first near the straight way."""
+    """2 to `slots` blocks, half of them lower than the camera and half taller, the first near the straight path."""
     u = u[:6, :slots]
     near = jnp.array([1.0] + [0.0] * (slots - 1))
     spread_y = 0.60 - near * (0.60 - 0.15)
@@ -124,7 +124,7 @@ def _obstacles(u, difficulty, middle, slots: int = 6) -> Boxes:
 
 
 def _bump(u, difficulty, middle, population: Population | None = None) -> Boxes:
-    """A bar of 3 cm across the straight way, 15 to 45 cm wide, turned up to 30 degrees; harder: a longer detour."""
+    """A bar of 3 cm across the straight path, 15 to 45 cm wide, turned up to 30 degrees; harder: a longer detour."""
     u = 2 * u[6] - 1
     half_y = 0.18 + difficulty * 0.52 + 0.06 * u[0]
     half_x = 0.15 + 0.075 * u[1]
@@ -136,7 +136,7 @@ def _bump(u, difficulty, middle, population: Population | None = None) -> Boxes:
 def _stairs(u, difficulty, middle) -> Boxes:
     """A step of 3 cm with one of 6 cm on it; ledges of 18 to 22 cm, to stand on clear of the upper step.
 
-    On the sides the upper step ends with the lower one: a floor cell beside it sees a block of 6 cm.
+    On the sides the upper step ends with the lower one: a floor cell beside it faces a block of 6 cm.
     """
     u = 2 * u[6] - 1
     upper_x = 0.11 + 0.03 * u[0]
@@ -147,7 +147,7 @@ def _stairs(u, difficulty, middle) -> Boxes:
 
 
 def _gate(u, difficulty, middle, shift: Float[Array, ""] | float = 0.0) -> Boxes:
-    """Two walls with a gap of 42 to 51 cm and a lintel 37 cm above it; harder: longer walls, less way round."""
+    """Two walls with a gap of 42 to 51 cm and a lintel 37 cm above it; harder: longer walls, less space around them."""
     u = 2 * u[7] - 1
     gap = 0.49 - 0.05 * difficulty + 0.02 * u[0]
     reach = 0.10 + 0.60 * difficulty  # [m] length of each wall
@@ -159,7 +159,7 @@ def _gate(u, difficulty, middle, shift: Float[Array, ""] | float = 0.0) -> Boxes
 
 
 def _mixed(u, difficulty, middle) -> Boxes:
-    """A gate, a bar of 3 cm before or behind it, and up to two blocks by the rims."""
+    """A gate, a bar of 3 cm before or behind it, and up to two blocks near the rims."""
     side = jnp.where(u[7, -1] < 0.5, 1.0, -1.0)
     gate = _gate(u, difficulty, middle, 0.25 * side)
     bump = _bump(u, difficulty, middle - jnp.array([0.22, 0.0]) * side)
@@ -170,7 +170,7 @@ def _mixed(u, difficulty, middle) -> Boxes:
 
 
 def _clutter(u, difficulty, middle) -> Boxes:
-    """4 to 10 small things anywhere: a third of them 3 cm islands, the others blocks of 9 to 50 cm."""
+    """4 to 10 small boxes anywhere: a third of them 3 cm islands, the others blocks of 9 to 50 cm."""
     slots = 10
     u = u[:6, :slots]
     island = jnp.arange(slots) % 3 == 0
@@ -183,7 +183,7 @@ def _clutter(u, difficulty, middle) -> Boxes:
 
 
 def _traffic(u, difficulty, middle) -> Boxes:
-    """1 to 4 blocks of 8 to 14 cm that go to and fro across the way, every other one lower than the camera."""
+    """1 to 4 blocks of 8 to 14 cm that move back and forth across the path, every other one lower than the camera."""
     u = u[:4, :WALKERS]
     half, high = 0.04 + 0.03 * u[2], jnp.where(jnp.arange(WALKERS) % 2 == 0, TALL, 0.25)
     used = jnp.arange(WALKERS) < jnp.round(1 + (WALKERS - 1) * difficulty)
@@ -192,7 +192,7 @@ def _traffic(u, difficulty, middle) -> Boxes:
 
 
 def _movers(u, boxes: Boxes, traffic: Bool[Array, ""], population: Population | None) -> Movers:
-    """The ways of the boxes of `_traffic`, 0.75 to 1.1 m long; of those of any other family, none."""
+    """The paths of the boxes of `_traffic`, 0.75 to 1.1 m long; none for other families."""
     u = u[4:8]
     x = jnp.clip(boxes.x + 0.2 * (2 * u[0] - 1), SIZE_X / 2 - TRAFFIC_X, SIZE_X / 2 + TRAFFIC_X)
     speed = TRAFFIC_SPEED * u[2]
@@ -220,9 +220,9 @@ def _keep_inside(boxes: Boxes) -> Boxes:
     Only the long side shrinks: a bar stays as wide as it was drawn.
     """
     cos, sin = jnp.abs(jnp.cos(boxes.yaw)), jnp.abs(jnp.sin(boxes.yaw))
-    lies_x = boxes.half_x > boxes.half_y  # the long side is the box's own x
+    lies_x = boxes.half_x > boxes.half_y  # whether the long side is the box's own x
     short = jnp.minimum(boxes.half_x, boxes.half_y)
-    long_x, long_y = jnp.where(lies_x, cos, sin), jnp.where(lies_x, sin, cos)  # how much of it lies along world x, y
+    long_x, long_y = jnp.where(lies_x, cos, sin), jnp.where(lies_x, sin, cos)  # its components along world x, y
     room_x = (SIZE_X / 2 - long_y * short) / jnp.maximum(long_x, 1e-6)
     room_y = (SIZE_Y / 2 - long_x * short) / jnp.maximum(long_y, 1e-6)
     long = jnp.minimum(jnp.maximum(boxes.half_x, boxes.half_y), jnp.minimum(room_x, room_y))
@@ -233,14 +233,14 @@ def _keep_inside(boxes: Boxes) -> Boxes:
 
 
 def _keep_ends_free(boxes: Boxes, start: Float[Array, "2"], goal: Float[Array, "2"]) -> Boxes:
-    """Drop the boxes that would stand on the robot, or on its goal."""
+    """Drop the boxes that would cover the robot or its goal."""
     near = jnp.minimum(plan_distance(boxes, start[0], start[1]), plan_distance(boxes, goal[0], goal[1]))
     free = near > jnp.where(boxes.top <= BUMP, 0.10, CLEARANCE)
     return replace(boxes, used=boxes.used & free)
 
 
 def _landmarks(u: Float[Array, "2 M"], boxes: Boxes) -> Landmarks:
-    """Landmarks near their nominal places, left out where a box covers them."""
+    """Landmarks near their nominal positions, left out where a box covers them."""
     count = len(LANDMARKS_X)
     u = 2 * u - 1
     x = jnp.array(LANDMARKS_X) + 0.05 * u[0, :count]

@@ -1,4 +1,4 @@
-"""What a robot in an arena stands on, and sees of it: the floor, the terrain, and the boxes on both."""
+"""The ground of an arena, as the robot stands on it and sees it: the floor, the terrain, and the boxes on both."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from jaxbiped.geometry import boxes
 from jaxbiped.geometry.height_field import HeightField, cast_rays, on_field, surface_height
 from jaxbiped.geometry.rays import INSIDE, Rays, cast_floor
 
-WITH_TERRAIN = {"sensor": ("oracle", "raycast"), "executor": ("kinematic", "sampled")}  # which know it
-HOLE = -1.0  # [m] at which the ground of a hole is taken to lie: whoever steps there falls
+WITH_TERRAIN = {"sensor": ("oracle", "raycast"), "executor": ("kinematic", "sampled")}  # which support it
+HOLE = -1.0  # [m] assumed ground height of a hole: a robot that steps there falls
 
 
 def ground_height(arena: Arena, x: Float[Array, "*S"], y: Float[Array, "*S"]) -> Float[Array, "*S"]:
     """Height [m] of the ground at points (x, y) [m] of one arena: the highest of terrain and floor-standing boxes.
 
-    Where the terrain does not reach, the floor lies at 0; in its holes there is none, and it is `HOLE`.
+    Where there is no terrain, the floor is at 0; in holes of the terrain there is no ground, and the height is `HOLE`.
     """
     if arena.terrain is None:
         return boxes.ground_height(arena.boxes, x, y)
@@ -40,7 +40,7 @@ def rises_near(
 ) -> Bool[Array, ""]:
     """Whether the terrain of one arena is higher than `height` [m] within `radius` [m] of a point.
 
-    It is looked at in the point and at 96 places around it, at most a quarter of the radius apart: 2 cm for a body.
+    It is evaluated at the point and at 96 positions around it, at most a quarter of the radius apart: 2 cm for a body.
     """
     if terrain is None:
         return jnp.zeros((), bool)
@@ -53,7 +53,7 @@ def rises_near(
 def cast_ground(
     arena: Arena, origin: Float[Array, "3"], basis: Float[Array, "3 3"], x: Rays, y: Rays
 ) -> Float[Array, "R"]:
-    """Nearness of floor and terrain of one arena for the rays of a pinhole, as of `geometry.rays`; 0 for neither."""
+    """Nearness of floor and terrain of one arena for the rays of a pinhole, as in `geometry.rays`; 0 for neither."""
     floor = cast_floor(arena.size_xy, origin, basis, x, y)
     if arena.terrain is None:
         return floor
@@ -66,7 +66,7 @@ def cast_ground(
 
 
 def refuse_terrain(arena: Arena, who: str) -> None:
-    """Refuse an arena with terrain on behalf of what does not know any.
+    """Reject an arena with terrain on behalf of a component that does not support it.
 
     Raises:
       InputError: the arena has terrain.
@@ -76,6 +76,6 @@ def refuse_terrain(arena: Arena, who: str) -> None:
 
 
 def no_terrain_for(who: str) -> InputError:
-    """What to say of something that does not know terrain."""
+    """The error about a component that does not support terrain."""
     known = ", ".join(f"{kind}s {' and '.join(names)}" for kind, names in WITH_TERRAIN.items())
-    return InputError(f"does not know terrain, which this arena has; these do: {known}", field=who)
+    return InputError(f"does not support terrain, which this arena has; supported by {known}", field=who)

@@ -1,4 +1,4 @@
-"""An arena from a few arrays, for generators that people write."""
+"""An arena from a few arrays, for users' generators."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.geometry.boxes import Boxes, plan_distance
 
 COLUMNS = "x, y, yaw, length, width, bottom, top"
-COVERED = 0.08  # [m] nearer than this to a box a landmark is not laid
+COVERED = 0.08  # [m] landmarks nearer than this to a box are left out
 
 
 def make_arena(
@@ -32,14 +32,14 @@ def make_arena(
 
     Args:
       boxes: [M, 7]: centre x and y [m], yaw [rad], length along it and width across it [m], and the heights of its
-        bottom and top [m]; a bottom above 0 hangs overhead. A box whose top is not above its bottom, or that has no
-        length or width, is not there: so a generator with more or fewer boxes returns as many each time. A list may
-        hold `Box` objects, which are not traced, in place of rows.
+        bottom and top [m]; a box with a bottom above 0 hangs overhead. A box whose top is not above its bottom, or that
+        has no length or width, is absent, so that a generator with a varying number of boxes can always return as many
+        rows. A list may hold `Box` objects, which are not traced, instead of rows.
       start: x, y [m] and yaw [rad].
       goal: x, y [m].
-      size: [m] of the area, which begins at the origin; not traced.
+      size: [m] of the area, which starts at the origin; not traced.
       difficulty: 0 (easy) to 1 (hard): tables and figures show thirds of it.
-      landmarks: by default those of the built-in families, where no box covers them, scaled to the area.
+      landmarks: by default those of the built-in families, unless covered by a box, scaled to the area.
 
     Raises:
       InputError: arrays of other shapes, or a size that is not positive.
@@ -55,7 +55,7 @@ def make_arena(
     goal = _array("goal", goal, (2,), "x, y")
     if len(size) != 2 or not all(0 < side <= 1000 for side in size):
         raise InputError("must be two lengths above 0 m", field="size", value=size)
-    slots = max(MAX_BOXES, rows.shape[0])  # as random arenas have, so that they share compiled programs
+    slots = max(MAX_BOXES, rows.shape[0])  # as in random arenas, so that they share compiled programs
     x, y, yaw, length, width, bottom, top = jnp.pad(rows, ((0, slots - rows.shape[0]), (0, 0))).T
     used = (top > bottom) & (length > 0) & (width > 0)
     seen = jnp.ones(slots).at[: len(rows)].set(contrast)
@@ -73,7 +73,7 @@ def make_arena(
 
 
 def _row(box: BoxConfig) -> tuple[float, ...]:
-    """Of `COLUMNS`."""
+    """The values of `COLUMNS` for a box."""
     return *box.centre, box.yaw, *box.size, box.bottom, box.top
 
 

@@ -1,6 +1,6 @@
-"""Obstacles that move: boxes that go to and fro between two places, at constant speed.
+"""Moving obstacles: boxes that move back and forth between two positions, at constant speed.
 
-The arenas of the paper stand still; obstacles that move are its future work. Where a mover is is a function of the
+The arenas of the paper are static; moving obstacles are its future work. The position of a mover is a function of the
 mission's time alone, so that all strategies meet the same ones. Movers do not see the robot, and do not stop for it.
 """
 
@@ -21,23 +21,23 @@ if TYPE_CHECKING:
     from jaxbiped.arenas.arena import Arena
 
 ARENA = {"Arena": "jaxbiped.arenas.arena"}  # which imports this module
-SHORTEST = 1e-3  # [m] a shorter way is none
+SHORTEST = 1e-3  # [m] a shorter path counts as none
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Movers:
-    """The ways of the `M` boxes of an arena. Speed 0: the box stands, at its phase."""
+    """The paths of the `M` boxes of an arena. With speed 0 the box stands still, at its phase."""
 
-    dx: Float[Array, "*B M"]  # [m] from the place of the box to the far end of its way
+    dx: Float[Array, "*B M"]  # [m] from the position of the box to the far end of its path
     dy: Float[Array, "*B M"]  # [m]
     speed: Float[Array, "*B M"]  # [m/s]
-    phase: Float[Array, "*B M"]  # at time 0: 0 at its place, 1 at the far end, up to 2 on its way back
+    phase: Float[Array, "*B M"]  # at time 0: 0 at its position, 1 at the far end, up to 2 on the way back
 
 
 @checked(numbers=("time",), late=ARENA)
 def at_time(arena: Arena, time: Float[Array, ""] | float) -> Arena:
-    """One arena as it is at a time [s] of its mission, with boxes that stand."""
+    """One arena as it is at a time [s] of its mission, with static boxes."""
     finite("time", time)
     if arena.movers is None:
         return arena
@@ -55,7 +55,7 @@ def boxes_at(arena: Arena, time: Float[Array, ""] | float) -> Boxes:
 
 @checked(late=ARENA)
 def only(arena: Arena, moving: bool) -> Arena:
-    """One arena with only those of its boxes that move, or that stand. Those that stand are where they stand."""
+    """One arena with only its moving boxes, or only its static ones, which are at their positions."""
     if arena.movers is None:
         return arena
     moves = (arena.movers.speed > 0) & (jnp.hypot(arena.movers.dx, arena.movers.dy) > SHORTEST)

@@ -1,4 +1,4 @@
-"""What a study may fix of the random arenas, which is drawn otherwise."""
+"""Measures of random arenas that a study may fix instead of drawing them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxtyping import Array, Float
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Population:
-    """`PopulationConfig`, traced. Units as there; NaN where it is drawn."""
+    """`PopulationConfig`, traced. Same units; NaN for drawn values."""
 
     bump_width: Float[Array, "*B"]
     bump_length: Float[Array, "*B"]
@@ -21,5 +21,5 @@ class Population:
 
 
 def given_or(fixed: Float[Array, ""], drawn: Float[Array, "*S"]) -> Float[Array, "*S"]:
-    """What is fixed, or else what was drawn."""
+    """The fixed value if there is one, else the drawn one."""
     return jnp.where(jnp.isnan(fixed), drawn, fixed)

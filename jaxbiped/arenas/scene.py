@@ -1,4 +1,4 @@
-"""Scenes written by hand, in TOML: one arena a file."""
+"""Scenes written by hand, in TOML: one arena per file."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ Angle = Annotated[float, pydantic.Field(ge=-2 * math.pi, le=2 * math.pi)]
 Fraction = Annotated[float, pydantic.Field(ge=0.0, le=1.0)]
 Point = tuple[Metres, Metres]
 
-# Of the robot of the paper: no box between a step above the ground and its head may be nearer to the start or the goal.
-LOWEST, HIGHEST = -0.2, 0.69  # [m] of ground that a robot may start on or go to: the levels that a map has
+# For the paper's robot: no box between a step above the ground and its head may be nearer to the start or the goal.
+LOWEST, HIGHEST = -0.2, 0.69  # [m] heights of ground for start and goal: the levels of a map
 START_CLEARANCE, STEP, STANDING, SQUATTING = 0.08, 0.03, 0.385, 0.34  # [m]
 
 
@@ -36,15 +36,15 @@ class BoxConfig(Model):
     """An upright box."""
 
     centre: Point
-    """[m] centre in plan."""
+    """[m] Centre in plan."""
     size: tuple[Positive, Positive]
-    """[m] full sizes along the box's own x and y."""
+    """[m] Full sizes along the box's own x and y."""
     yaw: Angle = 0.0
-    """[rad] anticlockwise from the world's x."""
+    """[rad] Anticlockwise from the world's x."""
     bottom: Annotated[float, pydantic.Field(ge=0.0, le=10.0)] = 0.0
-    """[m] height of the underside; above 0 the box hangs overhead."""
+    """[m] Height of the underside; above 0 the box hangs overhead."""
     top: Annotated[float, pydantic.Field(gt=0.0, le=10.0)]
-    """[m] height of the top."""
+    """[m] Height of the top."""
     contrast: Fraction = 1.0
     """Texture contrast: 0 is plain, and cannot be measured by stereo."""
 
@@ -61,28 +61,28 @@ class LandmarkConfig(Model):
     kind: Literal["circle", "square"]
     """A disc of 7.5 cm radius or a square of 5 cm (paper, 3.1)."""
     at: Point
-    """[m] centre."""
+    """[m] Centre."""
     yaw: Angle = 0.0
     """[rad]"""
 
 
 class TerrainConfig(Model):
-    """The ground as an elevation map; where it does not reach, the floor lies at 0."""
+    """The ground as an elevation map; elsewhere the floor is at 0."""
 
     file: Annotated[str, pydantic.Field(min_length=1)]
-    """The map (`jaxbiped.formats.elevation`), absolute or from the folder of the scene."""
+    """The map (`jaxbiped.formats.elevation`); a relative path starts at the folder of the scene."""
     cell: Positive | None = None
-    """[m] a pixel of a picture."""
+    """[m] Size of a pixel of a picture."""
     range: tuple[Metres, Metres] | None = None
-    """[m] heights of the darkest and the brightest value there can be in a picture."""
+    """[m] Heights of the darkest and the brightest possible value in a picture."""
     hole: float | None = None
-    """Value of pixels of a picture that were not measured. There is no ground there."""
+    """Value of unmeasured pixels in a picture. There is no ground there."""
     scale: Positive = 1.0
-    """Factor of all three axes: brings a building to the robot's size."""
+    """Factor of all three axes: scales a building to the robot's size."""
     origin: Point | None = None
-    """[m] place of the first height, that of least x and y; by default the file's own."""
+    """[m] Position of the first height, at the smallest x and y; by default that in the file."""
     floor: Annotated[float, pydantic.Field(ge=-1e4, le=1e4)] = 0.0
-    """[m] height in the map, after `scale`, that is the arena's 0."""
+    """[m] Height in the map, after `scale`, that becomes 0 in the arena."""
 
 
 class SceneConfig(Model):
@@ -90,11 +90,11 @@ class SceneConfig(Model):
 
     name: Annotated[str, pydantic.Field(min_length=1, max_length=80)]
     size: tuple[Positive, Positive] = (1.80, 1.40)
-    """[m] the area, from the origin (paper, 3.1)."""
+    """[m] The area, from the origin (paper, 3.1)."""
     start: tuple[Metres, Metres, Angle]
-    """[m, m, rad] where the robot stands at first."""
+    """[m, m, rad] Initial pose of the robot."""
     goal: Point
-    """[m] the point to reach within 10 cm."""
+    """[m] The point to reach within 10 cm."""
     floor_contrast: Fraction = 1.0
     boxes: tuple[BoxConfig, ...] = ()
     landmarks: tuple[LandmarkConfig, ...] = ()
@@ -106,14 +106,14 @@ def load_scene(path: str | Path) -> tuple[str, Arena]:
     """Name and arena of a scene file.
 
     Raises:
-      InputError: what is wrong with the file, first thing first; start, goal or a box outside the area; start or
-        goal inside an obstacle; a terrain that cannot be read, or start or goal where it has no ground to stand on.
+      InputError: the first error in the file; start, goal or a box outside the area; start or goal inside an
+        obstacle; a terrain that cannot be read, or start or goal where it has no ground to stand on.
     """
     scene = load(SceneConfig, path)
     try:
         terrain = to_terrain(scene, Path(path).parent)
     except InputError as error:
-        if error.file is not None:  # it is of the map
+        if error.file is not None:  # it is from the map
             raise
         raise error.within(path) from None
     _check(scene, path, terrain)
@@ -121,12 +121,12 @@ def load_scene(path: str | Path) -> tuple[str, Arena]:
 
 
 def to_terrain(scene: SceneConfig, folder: Path) -> HeightField | None:
-    """The terrain of a scene in `folder`, cut to its area; None where it has none.
+    """The terrain of a scene in `folder`, cut to its area; None if it has none.
 
     Raises:
-      InputError: the map cannot be used, or lies beside the area.
+      InputError: the map cannot be used, or lies outside the area.
     """
-    from jaxbiped.formats.elevation import load_elevation  # a room beyond this one, which reads files for it
+    from jaxbiped.formats.elevation import load_elevation  # from a later room, which reads files for this one
 
     given = scene.terrain
     if given is None:
@@ -140,7 +140,7 @@ def to_terrain(scene: SceneConfig, folder: Path) -> HeightField | None:
     if (last <= first).any():
         wide, deep = elevation.size_xy
         message = (
-            f"must lay the terrain, {wide:g} x {deep:g} m, into the area of {scene.size[0]:g} x {scene.size[1]:g} m"
+            f"must place the terrain, {wide:g} x {deep:g} m, inside the area of {scene.size[0]:g} x {scene.size[1]:g} m"
         )
         raise InputError(message, field="terrain.origin", value=origin)
     heights = elevation.heights[first[1] : last[1] + 1, first[0] : last[0] + 1]
@@ -149,7 +149,7 @@ def to_terrain(scene: SceneConfig, folder: Path) -> HeightField | None:
 
 @checked()
 def to_arena(scene: SceneConfig) -> Arena:
-    """The arena of a scene without its terrain (see `to_terrain`), with at least the slots of a random arena.
+    """The arena of a scene without its terrain (see `to_terrain`), with at least as many slots as a random arena.
 
     So both share compiled programs.
     """
@@ -224,7 +224,7 @@ def _check(scene: SceneConfig, path: str | Path, terrain: HeightField | None) ->
 
 @runtime_checkable
 class Measures(Protocol):
-    """What warnings read of a robot; `motion.robot.RobotConfig` has it."""
+    """The robot's measures that warnings read; `motion.robot.RobotConfig` has them."""
 
     body_radius: float  # [m]
     standing: float  # [m]
@@ -233,12 +233,12 @@ class Measures(Protocol):
 
 
 def scene_warnings(arena: Arena, robot: Measures, level_height: float) -> tuple[str, ...]:
-    """What a person should know of a scene before this robot walks in it: one line each, first the start.
+    """Warnings about a scene before this robot walks in it: one line each, with the start first.
 
-    The robot starts in an obstacle (`load_scene` refuses only what is one to the robot of the paper, and no terrain
+    The robot starts in an obstacle (`load_scene` only rejects what is an obstacle to the paper's robot, and no terrain
     that only rises beside it), or a box is a
-    trap: higher than the robot's step over what it stands on, and lower than what is an obstacle by its level alone
-    (from `level_height` [m] times a half on). Such ground is told from a bump by a few millimetres.
+    trap: higher than the robot's step above its ground, and lower than an obstacle by its level alone (from
+    `level_height` [m] times a half on). Such ground differs from a bump only by a few millimetres.
     """
     boxes = [BoxConfig(**box) for box in _rows(arena)]
     x, y = (float(v) for v in arena.start_xyyaw[:2])
@@ -278,7 +278,7 @@ def base_height(terrain: HeightField | None, point: tuple[float, float]) -> floa
 
 
 def _rows(arena: Arena) -> list[dict]:
-    """The boxes in use of one arena as fields of `BoxConfig`, in numbers as they were written."""
+    """The boxes in use in one arena as fields of `BoxConfig`, with numbers as they were written."""
     leaves = (arena.boxes.x, arena.boxes.y, arena.boxes.half_x, arena.boxes.half_y, arena.boxes.yaw, arena.boxes.bottom,
               arena.boxes.top)  # fmt: skip
     used = np.flatnonzero(np.asarray(arena.boxes.used))

@@ -1,4 +1,4 @@
-"""Arenas of a study: families that are built in, generators that people bring, and scenes, taking turns."""
+"""Arenas of a study: built-in families, users' generators, and scenes, taking turns."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ from jaxbiped.geometry.height_field import HeightField
 
 Generator = Callable[[PRNGKeyArray], Arena]
 NAME = re.compile(r"[A-Za-z0-9][\w .+-]{0,39}")  # shown in tables, figures and pages
-OWN = 2  # fold_in of an arena's key, for generators that people bring
+OWN = 2  # fold_in of an arena's key, for users' generators
 
 
 @dataclass(frozen=True)
 class Family:
-    """Arenas of one kind, which people bring: a pure function of a random key.
+    """A user's arenas of one kind: a pure function of a random key.
 
     Args:
-      name: of the stratum in rows, tables and figures.
-      generator: gives one arena, in JAX; all of one size, with as many boxes and landmarks each time (unused ones have
+      name: name of the stratum in rows, tables and figures.
+      generator: returns one arena, in JAX; all of one size, always with as many boxes and landmarks (unused ones have
         `used` False). Arena k of a study is `generator(fold_in(fold_in(key(seed), k), 2))`.
     """
 
@@ -54,7 +54,7 @@ class Family:
         """One arena, checked.
 
         Raises:
-          InputError: what the generator returned is no arena, or not one of one.
+          InputError: the generator did not return an arena, or not a single one.
         """
         made = self.generator(key)
         where = f"family {self.name}"
@@ -67,7 +67,7 @@ class Family:
         for name, shape in shapes.items():
             found = np.shape(getattr(made, name))
             if found != shape:
-                raise InputError(f"its generator returned {list(found)} where {list(shape)} is wanted",
+                raise InputError(f"its generator returned {list(found)} where {list(shape)} is required",
                                  field=f"{where}: {name}")  # fmt: skip
         for name, part in (("boxes", made.boxes), ("landmarks", made.landmarks)):
             sizes = {np.shape(leaf) for leaf in jax.tree.leaves(part)}
@@ -77,7 +77,7 @@ class Family:
         return made
 
     def digest(self) -> str:
-        """Of its code."""
+        """Digest of its code."""
         return component_hash(self)
 
 
@@ -95,7 +95,7 @@ class SceneFamily:
         return jax.tree.map(jnp.asarray, self.scene)
 
     def digest(self) -> str:
-        """Of its file."""
+        """Digest of its file."""
         return self.text
 
 
@@ -103,24 +103,24 @@ OwnFamily = Family | SceneFamily
 
 
 def check_name(name: object, file: Path | None = None) -> None:
-    """Raise `InputError` about a name that cannot be shown everywhere, or that is one of a family that is built in."""
+    """Raise `InputError` about a name that cannot be displayed everywhere, or that belongs to a built-in family."""
     if not isinstance(name, str) or not NAME.fullmatch(name):
         message = "must begin with a letter or digit and have at most 40 letters, digits, blanks and . _ + -"
         raise InputError(message, file=file, field="name of a family", value=name)
     if name in KNOWN:
-        raise InputError("is the name of a family that is built in", file=file, field="name of a family", value=name)
+        raise InputError("is the name of a built-in family", file=file, field="name of a family", value=name)
 
 
 def scene_name(path: Path) -> str:
-    """The family's name of a scene file: the file's, which is told from that of a family that is built in."""
+    """The family name of a scene file: the file's name, made distinct from built-in families."""
     return f"scene {path.stem}" if path.stem in KNOWN else path.stem
 
 
 def scene_family(path: str | Path) -> SceneFamily:
-    """A scene file as a family that has the file's name (`scene_name`).
+    """A scene file as a family with the file's name (`scene_name`).
 
     Raises:
-      InputError: what is wrong with the file.
+      InputError: any error in the file.
     """
     check_name(scene_name(Path(path)), Path(path))
     load_scene(path)
@@ -134,10 +134,10 @@ def _scene_family(path: Path, text: str) -> SceneFamily:
 
 
 def find_family(name: str) -> str | OwnFamily:
-    """What a family's name stands for: itself where it is built in, a scene file, a registered or an imported one.
+    """The family of a name: the name itself if it is built in, else a scene file, a registered or an imported family.
 
     Raises:
-      InputError: a name that is not known, with those that are; a file or module that cannot be used.
+      InputError: an unknown name, with the known ones; a file or module that cannot be used.
     """
     if name in KNOWN:
         return name
@@ -161,7 +161,7 @@ def name_of(family: str | OwnFamily) -> str:
 
 
 def size_of(family: str | OwnFamily) -> tuple[float, float]:
-    """[m] The size that all arenas of a family have."""
+    """[m] The common size of all arenas of a family."""
     if isinstance(family, str):
         return SIZE_X, SIZE_Y
     x, y = (round(float(side), 6) for side in np.asarray(_one(family).size_xy))
@@ -175,7 +175,7 @@ def terrain_of(family: str | OwnFamily) -> HeightField | None:
 
 @cache
 def _one(family: OwnFamily) -> Arena:
-    """Any one arena of a family."""
+    """An arbitrary arena of a family."""
     return jax.device_get(jax.jit(family.arena)(jax.random.key(0)))
 
 
@@ -192,8 +192,8 @@ def draw_arena(
 
     Args:
       families: static.
-      population: what is fixed of families that are built in.
-      turn: which of the families it is; by default `index` modulo their number.
+      population: measures that are fixed for built-in families.
+      turn: index of its family; by default `index` modulo their number.
     """
     own = [item for item in families if not isinstance(item, str)]
     if not own:
@@ -212,13 +212,13 @@ def draw_arena(
 
 
 def _turn(turn: Int[Array, ""], families: tuple[str | OwnFamily, ...]) -> Int[Array, ""]:
-    """The place of the family whose turn it is among those that are built in."""
+    """The position, among the built-in families, of the family whose turn it is."""
     before = np.cumsum([isinstance(item, str) for item in families]) - 1
     return jnp.asarray(np.maximum(before, 0))[turn]
 
 
 def padded(arenas: Sequence[Arena]) -> list[Arena]:
-    """Arenas with as many slots for boxes and landmarks each, of the types of the first."""
+    """Arenas padded to equally many slots for boxes and landmarks, with the types of the first."""
     boxes = max(arena.boxes.x.shape[0] for arena in arenas)
     marks = max(arena.landmarks.x.shape[0] for arena in arenas)
 

@@ -1,4 +1,4 @@
-"""How far two backends agree on primitives: where the robot is at every moment, and how hard trials end."""
+"""Agreement of two backends on primitives: the robot's position at every moment, and the outcomes of hard trials."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from jaxbiped.biped.trial import Disturbance, Tolerance, boxes_of
 from jaxbiped.biped.verify import VARIED, address, roll, trial_spec, trials
 
 CROSSING = DisturbanceSet(rise=0.014, edge=0.032, yaw=16.0)
-"""Edges of a bump that are higher, lower, nearer, further and turned: about a third of the steps up fail."""
+"""Edges of a bump that are higher, lower, nearer, farther and rotated: about a third of the steps up fail."""
 
 
 @dataclass(frozen=True)
 class Paths:
-    """How far apart two backends are."""
+    """The distance between two backends over time."""
 
-    time: Float[np.ndarray, "T"]  # [s] since the beginning of the trial
-    apart: Float[np.ndarray, "T"]  # [m] the furthest of both soles and the head; NaN where one is not valid
+    time: Float[np.ndarray, "T"]  # [s] since the start of the trial
+    apart: Float[np.ndarray, "T"]  # [m] the largest over both soles and the head; NaN where one is not valid
 
     @property
     def worst(self) -> tuple[float, float]:
-        """(distance [m], time [s]) at which it is greatest; infinite where one of them was not valid."""
+        """(distance [m], time [s]) of the maximum; infinite where one of them was not valid."""
         k = int(np.argmax(np.where(np.isnan(self.apart), np.inf, self.apart)))
         return (float("inf") if np.isnan(self.apart[k]) else float(self.apart[k])), float(self.time[k])
 
@@ -37,7 +37,7 @@ def paths(table: PrimitiveTable, robot: RobotModelConfig, backend: str = "mjx", 
     """One undisturbed trial of a primitive in `native` and in another backend.
 
     Raises:
-      InputError: about the other backend.
+      InputError: raised by the other backend.
     """
     places, time = [], np.zeros(0)
     spec = trial_spec(robot, boxes_of(table.request))

@@ -1,4 +1,4 @@
-"""The biped's proportions, masses and servos, as the gait generator and the simulated robot share them."""
+"""The biped's proportions, masses and servos, shared by the gait generator and the simulated robot."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class ProportionsConfig(Model):
     shank: Length = 0.095
     thigh: Length = 0.095
     hip_offset: Length = 0.045
-    """Each hip to the side of the middle; the feet stand under the hips."""
+    """Lateral offset of each hip; the feet stand under the hips."""
     torso_top: Length = 0.145
     """Top of the torso above the hips."""
     camera_top: Length = 0.185
     """Top of the stereo camera above the hips."""
     camera_baseline: Length = 0.12
-    """Distance of the two lenses."""
+    """Distance between the two lenses."""
 
 
 class StanceConfig(Model):
@@ -57,9 +57,10 @@ class StanceConfig(Model):
     """While stepping over a rise."""
     squatting: Length = 0.155
     inward: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.012
-    """How far inside a foot's middle it bears the whole weight: less sway, and less margin to the foot's inner edge."""
+    """Offset from a foot's middle to the inside where it carries the whole weight: less sway, and less margin to the
+    foot's inner edge."""
     inward_climbing: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.004
-    """The same while stepping over a rise, where the height may be other than expected."""
+    """The same while stepping over a rise, whose height may differ from the expected one."""
 
 
 class MassesConfig(Model):
@@ -73,12 +74,12 @@ class MassesConfig(Model):
 
     @property
     def total(self) -> float:
-        """Of the whole robot."""
+        """Mass of the whole robot."""
         return self.torso + 2 * (self.thigh + self.shank + self.foot)
 
 
 class ServoConfig(Model):
-    """Position servos, twelve of a kind: torque = kp (target - angle) - kv speed, within limits."""
+    """Position servos, twelve of one kind: torque = kp (target - angle) - kv speed, within limits."""
 
     kp: Annotated[float, pydantic.Field(gt=0.0)] = 60.0
     """[Nm/rad]"""
@@ -89,9 +90,9 @@ class ServoConfig(Model):
     damping: Annotated[float, pydantic.Field(ge=0.0)] = 0.05
     """[Nm s/rad] of the joint itself."""
     torque: Annotated[float, pydantic.Field(gt=0.0)] = 3.0
-    """[Nm] greatest."""
+    """[Nm] maximum."""
     speed: Annotated[float, pydantic.Field(gt=0.0)] = 300.0
-    """[deg/s] greatest."""
+    """[deg/s] maximum."""
 
 
 class RangesConfig(Model):
@@ -114,18 +115,18 @@ class RangesConfig(Model):
 
 
 class ContactConfig(Model):
-    """How feet touch the ground in simulation."""
+    """Contact of the feet with the ground in simulation."""
 
     foot: Literal["box", "spheres"] = "box"
-    """One box a foot, or small spheres under its rim."""
+    """One box per foot, or small spheres under its rim."""
     friction: Annotated[float, pydantic.Field(gt=0.0, le=10.0)] = 0.8
     """Sliding friction between a foot and the ground."""
 
 
 class RobotModelConfig(FileModel):
-    """A biped of six joints a leg; by default the ZMP e-nuvo WALK ver. 3 of the paper (3.1).
+    """A biped with six joints per leg; by default the ZMP e-nuvo WALK ver. 3 of the paper (3.1).
 
-    Known: 35 x 16 x 14 cm without the camera; 3 hip, 1 knee and 2 ankle joints a leg; steps of 3 cm. The rest is
+    Known: 35 x 16 x 14 cm without the camera; 3 hip, 1 knee and 2 ankle joints per leg; steps of 3 cm. The rest is
     guessed.
     """
 
@@ -174,7 +175,7 @@ class RobotModelConfig(FileModel):
         return np.deg2rad(np.concatenate([left, right]))
 
     def traced(self) -> Biped:
-        """What the generator computes with, as arrays."""
+        """The parameters of the generator, as arrays."""
         import jax.numpy as jnp
 
         from jaxbiped.biped.leg import Biped

@@ -1,9 +1,9 @@
-"""Primitives as tables of joint targets, generated from zero moment point and feet.
+"""Primitives as tables of joint targets, generated from the zero moment point and the feet.
 
 Minimum-jerk references of the feet and of the zero moment point -> centre of mass (linear inverted pendulum) -> pelvis,
 on the centre of mass of all links -> joint angles (exact inverse kinematics) -> targets of the servos, with the torque
 that holds the posture and the drag of the moving servo fed forward. All primitives start and end at rest in the same
-posture on both feet (one standing, one squatting), so that chains of them have no seam.
+posture on both feet (one standing, one squatting), so that chains of them are seamless.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from jaxbiped.biped.whole_body import link_masses, posture
 from jaxbiped.biped.zmp import com_from_zmp, zmp_of_masses
 from jaxbiped.errors import InputError
 
-KNOTS = 1024  # samples of a movement, whatever its duration: every primitive runs through one compiled function
+KNOTS = 1024  # samples of a movement of any duration: every primitive runs through one compiled function
 TIMESTEP = 0.005  # [s] of a table
-DIRECTIONS = 72  # in which the support polygon's width is looked up
-FILTER_ROUNDS = 2  # corrections of the pendulum's reference by what the links' masses make of it
-REACH_MARGIN = 0.001  # [m] that a leg keeps short of straight, where its kinematics are singular
+DIRECTIONS = 72  # in which the support polygon's width is tabulated
+FILTER_ROUNDS = 2  # corrections of the pendulum's reference by the effect of the links' masses
+REACH_MARGIN = 0.001  # [m] distance of a leg from straight, where its kinematics are singular
 
 
 @jax.tree_util.register_dataclass
@@ -42,10 +42,10 @@ class Motion:
     torque: Float[Array, "N 12"]  # [Nm] at rest
     com: Float[Array, "N 2"]  # [m] planned centre of mass
     zmp: Float[Array, "N 2"]  # [m] zero moment point of the links' masses
-    margin: Float[Array, "N"]  # [m] of the zero moment point inside the support polygon
+    margin: Float[Array, "N"]  # [m] distance of the zero moment point inside the support polygon
     feet: Float[Array, "N 2 4"]  # (x, y, z, yaw) of the left and the right sole
     pelvis: Float[Array, "N 3"]  # [m]
-    slack: Float[Array, "N 2"]  # [m] that each leg could reach further
+    slack: Float[Array, "N 2"]  # [m] remaining reach of each leg
 
 
 @dataclass(frozen=True)
@@ -65,17 +65,17 @@ class PrimitiveTable:
     zmp: np.ndarray  # [T, 2] [m]
     feet: np.ndarray  # [T, 2, 4] (x, y, z, yaw) of the soles [m, rad]
     pelvis: np.ndarray  # [T, 3] [m]
-    margin: float  # [m] least distance of the planned zero moment point from the support polygon's edge
+    margin: float  # [m] smallest distance of the planned zero moment point from the support polygon's edge
     peak_speed: float  # [rad/s] of any joint
     peak_torque: float  # [Nm] of any joint, at rest
 
 
 @functools.partial(jax.jit, static_argnames="knots")
 def perform(score: Score, biped: Biped, com_height: Float[Array, ""], knots: int = KNOTS) -> Motion:
-    """Play a score: everything of a movement but the checks. Compiled once; durations, lengths and robot are traced.
+    """Play a score: everything of a movement except the checks. Compiled once; durations, lengths and robot are traced.
 
     Args:
-      com_height: [m] of the pendulum.
+      com_height: [m] height of the pendulum.
       knots: samples; static.
     """
     total = jnp.sum(score.durations)
@@ -84,7 +84,7 @@ def perform(score: Score, biped: Biped, com_height: Float[Array, ""], knots: int
     values, swing = channels(score, time)
     reference, load, hip = values[:, :2], values[:, 2], values[:, 3]
     feet = values[:, 4:].reshape(knots, 2, 4)
-    # Each foot bears its share as far off its middle as the zero moment point lies off the line between the feet.
+    # The pressure on each foot is offset from its middle like the zero moment point from the line between the feet.
     share = jnp.stack([load, 1.0 - load], axis=1)
     off = reference - jnp.sum(share[..., None] * feet[..., :2], axis=1)
     pressure = feet[..., :2] + off[:, None]
@@ -97,7 +97,7 @@ def perform(score: Score, biped: Biped, com_height: Float[Array, ""], knots: int
         real = zmp_of_masses(pose(biped, com, hip, feet, load, pressure).links, masses, ground, dt)
         return wanted + (reference - real), None
 
-    # The pendulum looks a little beyond its rests; the seam is made exact below.
+    # The pendulum looks slightly beyond its rests; the ends are made exact below.
     wanted, _ = jax.lax.scan(correct, reference, None, length=FILTER_ROUNDS)
     com = settle(com_from_zmp(wanted, com_height, dt), reference[0], reference[-1], score, time)
     held = pose(biped, com, hip, feet, load, pressure)
@@ -121,8 +121,8 @@ def support_margin(
 ) -> Float[Array, "N"]:
     """Distance [m] of a point from the edge of the support polygon, negative outside.
 
-    The polygon's width is looked up in `DIRECTIONS` directions, square to the feet among them; between them the
-    distance is at most 0.1 mm too large, with feet of 10 cm.
+    The polygon's width is tabulated in `DIRECTIONS` directions, including those perpendicular to the feet; between them
+    the distance is at most 0.1 mm too large, with feet of 10 cm.
     """
     length, width = biped.foot
     corners = jnp.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]]) * jnp.stack([length, width]) / 2
@@ -140,11 +140,11 @@ def generate(request: Request, robot: RobotModelConfig, durations: np.ndarray | 
     """The primitive as a table.
 
     Args:
-      durations: [s] of the phases, where not by `schedule`; they replace the request's duration.
+      durations: [s] of the phases, instead of those of `schedule`; they replace the request's duration.
 
     Raises:
-      InputError: a leg cannot reach, a joint leaves its range, or a servo would have to turn faster or pull harder than
-        it can; the message says which and when.
+      InputError: a leg cannot reach, a joint leaves its range, or a servo would exceed its speed or torque; the message
+        says which and when.
     """
     song = compose(request, robot)
     if durations is None:
@@ -165,7 +165,7 @@ def home_table(robot: RobotModelConfig, squatting: bool) -> PrimitiveTable:
 
 
 def pendulum_height(request: Request, robot: RobotModelConfig) -> Float[Array, ""]:
-    """Mean height [m] of the centre of mass above the ground, roughly: the filter makes up for the rest."""
+    """Mean height [m] of the centre of mass above the ground, roughly: the filter corrects the rest."""
     return jnp.float32(hip_height(request, robot) + 0.01)
 
 

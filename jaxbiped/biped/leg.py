@@ -17,12 +17,12 @@ from jaxtyping import Array, Float
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Biped:
-    """`RobotModelConfig`, traced: what the generator's formulas need."""
+    """`RobotModelConfig`, traced: the parameters of the generator's formulas."""
 
     thigh: Float[Array, ""]  # [m]
     shank: Float[Array, ""]  # [m]
     ankle: Float[Array, ""]  # [m] above the sole
-    hip: Float[Array, ""]  # [m] to the side
+    hip: Float[Array, ""]  # [m] lateral offset
     masses: Float[Array, "4"]  # [kg] torso, thigh, shank, foot
     centres: Float[Array, "4"]  # [m] their centres of mass, above hips, hip, knee and ankle
     foot: Float[Array, "2"]  # [m] length, width
@@ -55,18 +55,18 @@ def leg_angles(
     ankle: Float[Array, "3"],
     R_foot: Float[Array, "3 3"],
 ) -> tuple[Float[Array, "6"], Float[Array, ""]]:
-    """Joint angles [rad] that hold the ankle at a place and the foot in an attitude.
+    """Joint angles [rad] that put the ankle at a position and the foot in an attitude.
 
-    The distance of hip and ankle gives the knee; the direction of the hip, seen from the foot, gives the ankle; what is
-    left of the attitude gives the hip. Of the solutions, the one with the knee bent forward and |hip roll| < 90 deg.
+    The distance of hip and ankle gives the knee; the direction of the hip, seen from the foot, gives the ankle; the
+    remaining rotation gives the hip. Of the solutions, the one with the knee bent forward and |hip roll| < 90 deg.
 
     Args:
       thigh, shank: lengths [m].
       hip, ankle: points [m] in one frame; R_pelvis, R_foot: attitudes in that frame.
 
     Returns:
-      The angles, and the slack [m]: length of the straight leg minus the distance. Where it is negative the ankle is
-      out of reach and the angles are those of a straight leg that points at it; callers must look at the slack.
+      The angles, and the slack [m]: length of the straight leg minus the distance. If it is negative the ankle is
+      out of reach and the angles are those of a straight leg that points at it; callers must check the slack.
     """
     x, y, z = R_foot.T @ (hip - ankle)
     upright = jnp.hypot(y, z)

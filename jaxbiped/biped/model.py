@@ -1,4 +1,4 @@
-"""The MJCF of the biped, and of the ground that it walks on."""
+"""The MJCF of the biped, and of the ground on which it walks."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from jaxbiped.biped.config import JOINTS, SIDES, RobotModelConfig, centres_of_ma
 TIMESTEP = 0.005  # [s]: at 16 ms it slips or falls
 SOLVER = {"iterations": 10, "ls_iterations": 20, "impratio": 10.0}
 """Enough iterations that more change nothing; impratio 10 keeps soft contacts from creeping (with 4 and 6 it falls)."""
-MARGIN = 0.0001  # [m] early contact of the feet: without it all but one contact of a foot on a box come and go, and in
-# the 25 s that a slow step down stands on one foot it turns by 4 degrees; with it, or half of it, by 0.01. No more:
-# in MJX it is size (`engine.grow`), and an edge bears the foot so much sooner.
-FAR = 100.0  # [m] below the ground where unused boxes lie
+MARGIN = 0.0001  # [m] early contact of the feet: without it all but one contact of a foot on a box flicker, and in
+# the 25 s on one foot of a slow step down it turns by 4 degrees; with it, or half of it, by 0.01. No larger:
+# in MJX it is added to the size (`engine.grow`), and an edge supports the foot that much earlier.
+FAR = 100.0  # [m] depth of unused boxes below the ground
 FEET, UPPER = 1, 2  # contact bits: feet meet floor and boxes, torso and head meet boxes, the robot never itself
 AXES = {"yaw": (0, 0, 1), "roll": (1, 0, 0), "pitch": (0, 1, 0)}
 DARK, LIGHT, RED = (0.15, 0.16, 0.2, 1), (0.85, 0.87, 0.9, 1), (0.75, 0.2, 0.15, 1)
@@ -25,9 +25,9 @@ PARTS = ("foot_left", "foot_right", "torso", "head")
 def robot_spec(config: RobotModelConfig) -> mujoco.MjSpec:
     """The biped alone, in the air: compile it or add terrain to it.
 
-    Free joint `root` in the middle between the hips; hinges `hip_yaw_left` .. `ankle_roll_right` in the order of
-    `JOINT_NAMES`, each with a position servo of its name; contact geoms whose names begin with one of `PARTS`; sites
-    `sole_left`, `sole_right`, `camera_left`, `camera_right` (x ahead, z up), `head_top`.
+    Free joint `root` at the midpoint of the hips; hinges `hip_yaw_left` .. `ankle_roll_right` in the order of
+    `JOINT_NAMES`, each with a position servo of the same name; contact geoms whose names begin with one of `PARTS`;
+    sites `sole_left`, `sole_right`, `camera_left`, `camera_right` (x ahead, z up), `head_top`.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "biped"
@@ -66,8 +66,9 @@ def robot_spec(config: RobotModelConfig) -> mujoco.MjSpec:
 def add_terrain(spec: mujoco.MjSpec, boxes: int = 0) -> mujoco.MjSpec:
     """Add the floor `floor` and `boxes` static boxes `box_0`.. to a spec, in place.
 
-    The boxes wait far below the ground. Bumps, walls and lintels are made of them by writing `geom_pos`, `geom_size`
-    (half sizes) and `geom_quat` of a compiled model, in one simulation or in each of many. Returns the spec.
+    The boxes are parked far below the ground. Bumps, walls and lintels are made from them by writing `geom_pos`,
+    `geom_size` (half sizes) and `geom_quat` of a compiled model, in one simulation or in each of many. Returns the
+    spec.
     """
     bits = {"contype": 0, "friction": (0.01, 0.005, 0.0001), "solref": (0.01, 1.0)}
     spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.1), conaffinity=FEET,
@@ -89,12 +90,12 @@ def set_box(
     model: mujoco.MjModel, slot: int, centre_xy: tuple[float, float], yaw: float, half_xy: tuple[float, float],
     bottom: float, top: float,
 ) -> None:  # fmt: skip
-    """Make box `slot` of a compiled model stand somewhere: [m] and [rad] in the world."""
+    """Place box `slot` of a compiled model: [m] and [rad] in the world."""
     geom = model.geom(f"box_{slot}")
     geom.pos = (*centre_xy, 0.5 * (bottom + top))
     geom.size = (*half_xy, 0.5 * (top - bottom))
     geom.quat = (np.cos(yaw / 2), 0, 0, np.sin(yaw / 2))
-    # The engine finds pairs in a bounding hierarchy; both of these are computed once, when the model is compiled.
+    # The engine finds pairs in a bounding volume hierarchy; both of these are computed only when the model is compiled.
     model.geom_rbound[geom.id] = np.linalg.norm(model.geom_size[geom.id])
     model.geom_aabb[geom.id] = (0, 0, 0, *model.geom_size[geom.id])
     mujoco.mj_setConst(model, mujoco.MjData(model))
@@ -121,7 +122,7 @@ def _inertia(body, mass: float, height: float, size: tuple[float, float, float])
 
 
 def _skin(body, half: Sequence[float | int], pos: Sequence[float | int], rgba) -> None:
-    """A box to be seen, which touches nothing."""
+    """A visual box without contacts."""
     body.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half, pos=pos, rgba=rgba, contype=0, conaffinity=0, mass=0)
 
 

@@ -1,7 +1,7 @@
 """Primitives that are as fast, or as stable, as the servos allow: phases and pressure points found with optax.
 
 The whole generator is differentiable, so the gradient of a primitive's duration or stability margin with respect to its
-phases is exact. What is found is tabulated like any other primitive, with every limit checked again.
+phases is exact. The result is tabulated like any other primitive, with every limit checked again.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from jaxbiped.biped.zmp import second_difference
 from jaxbiped.errors import InputError
 from jaxbiped.motion.config import Goal
 
-HEADROOM = 0.95  # of each limit that the search keeps to
+HEADROOM = 0.95  # fraction of each limit that the search may use
 SEARCH_KNOTS = 256  # samples while searching: a quarter of the table's, for a quarter of the time
-OFF_UNIT = 0.005  # [m] of the variables that move pressure points, so that Adam's steps suit them
-SHORTEST_PHASE = 0.25  # [s]: ten times the servos' lag kv/kp; what is shorter is not walked as planned
-PENALTY = 30.0  # of a relative violation against a relative gain
-STRETCH, STRETCHES = 1.02, 25  # of the durations, until the table passes its checks
+OFF_UNIT = 0.005  # [m] unit of the variables that move pressure points, so that Adam's steps suit them
+SHORTEST_PHASE = 0.25  # [s]: ten times the servos' lag kv/kp; shorter phases are not executed as planned
+PENALTY = 30.0  # weight of a relative violation against a relative gain
+STRETCH, STRETCHES = 1.02, 25  # stretching of the durations until the table passes its checks
 
 
 def optimise(
@@ -37,15 +37,15 @@ def optimise(
 ) -> PrimitiveTable:
     """The shortest primitive that keeps `least_margin`, or the one of the request's duration with the widest margin.
 
-    Free are the durations of all phases and, at each change of feet, where the weight is borne. Adam follows the
-    gradient of goal and violations of joint speed, torque (holding and turning the servo's own inertia), stability
-    margin and rest.
+    Free variables are the durations of all phases and, at each change of feet, where the weight is carried. Adam
+    follows the gradient of goal and violations of joint speed, torque (holding and turning the servo's own inertia),
+    stability margin and rest.
 
     Args:
-      least_margin: [m] of the zero moment point from the support polygon's edge, where the goal is "duration".
+      least_margin: [m] distance of the zero moment point from the support polygon's edge, if the goal is "duration".
 
     Raises:
-      InputError: as `generate` for the request itself; or when nothing found passes.
+      InputError: as in `generate` for the request itself; or if no solution found passes.
     """
     song = compose(request, robot)
     count = len(song.names)
@@ -61,7 +61,7 @@ def optimise(
         shift[row, k] = 1.0
         if k + 1 < len(moves):
             shift[moves[k + 1], k] = -1.0
-    shift[:, -1:] = 0.0  # the last change of feet goes to the middle, where every primitive ends
+    shift[:, -1:] = 0.0  # the last change of feet leads to the middle, where every primitive ends
     shift = jnp.asarray(np.pad(shift, ((0, 0), (0, PHASES - len(moves)))))
     fixed = goal == "margin"
     servo = robot.servo
@@ -81,7 +81,7 @@ def optimise(
 
 
 def _shifts(score: Score) -> np.ndarray:
-    """[R] which ramps move the load from foot to foot."""
+    """[R] Whether each ramp moves the load from foot to foot."""
     return np.asarray(score.delta)[:, CHANNELS.index("load")] != 0.0
 
 
@@ -91,7 +91,7 @@ def _optimiser(steps: int) -> optax.GradientTransformation:
 
 
 def _vary(variables: dict, arguments: tuple, fixed: bool) -> Score:
-    """The score with other durations (their sum kept, if `fixed`) and other points of pressure."""
+    """The score with other durations (with the same sum, if `fixed`) and other pressure points."""
     score, used, shift = arguments[:3]
     durations = jnp.exp(variables["log"]) * used
     if fixed:
@@ -114,7 +114,7 @@ def _loss(variables: dict, arguments: tuple, fixed: bool) -> Float[Array, ""]:
 
 
 def _violation(motion: Motion, score: Score, biped: Biped, speed, torque, armature) -> Float[Array, ""]:
-    """Squares of what is beyond the servos' limits, and of what the rests lack, in relative terms."""
+    """Squared violations of the servos' limits, and shortfalls of the rests, in relative terms."""
     dt = motion.time[1]
     turning = jnp.abs(jnp.diff(motion.q, axis=0)) / dt / (HEADROOM * speed)
     pulling = jnp.abs(motion.torque + armature * second_difference(motion.q, dt)) / (HEADROOM * torque)
@@ -134,7 +134,7 @@ def _step(variables: dict, state, arguments: tuple, fixed: bool, steps: int):
 
 
 def _verified(request, robot, names, variables, arguments, fixed, goal, least_margin) -> PrimitiveTable:
-    """Stretch what was found, a little at a time, until it passes every check."""
+    """Stretch the result in small steps until it passes every check."""
     varied, (biped, height) = _vary(variables, arguments, fixed), arguments[3:5]
     error = None
     for k in range(1 if fixed else STRETCHES):

@@ -1,4 +1,4 @@
-"""The primitives by name, as they are verified: Table 2's five, and what else a mission plays."""
+"""The primitives by name, as they are verified: the five of Table 2, and the others that missions play."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PAPER: dict[str, Request] = {
     "sidestep": ask.sidestep(0.03),
 }
 """At Table 2's durations. A step over the edge of a bump is 10 cm long, because a foot of 10 cm moved by 5 cm would
-stand on the edge; a gate takes three cells, because the head must come down and up clear of it."""
+stand on the edge; a gate takes three cells, because the head needs room to come down and up."""
 FIVE = ("straight", "turn", "step_up", "step_down", "gate")
 FAST = {  # [s] as fast as servos and balance safely allow
     "straight": 2.5,
@@ -39,7 +39,7 @@ FAST = {  # [s] as fast as servos and balance safely allow
 
 
 def catalogue(pace: Pace = "paper", bump: float = 0.03) -> dict[str, Request]:
-    """Every primitive by name, at the paper's durations or fast, over a bump of a height [m]."""
+    """Every primitive by name, at the paper's durations or fast, for a bump of a given height [m]."""
     asked = {name: request if pace == "paper" else request.lasting(FAST[name]) for name, request in PAPER.items()}
     return {
         name: dataclasses.replace(request, rise=math.copysign(bump, request.rise)) if request.rise else request

@@ -1,4 +1,4 @@
-"""What a primitive is asked to do."""
+"""The request for a primitive."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from jaxbiped.errors import InputError
 from jaxbiped.motion.config import DurationConfig
 from jaxbiped.motion.grid_units import CELL, EIGHTH
 
-LONGEST, WIDEST, SHARPEST = 0.0708, 0.04, math.radians(22.6)  # [m, m, rad] of one pair of steps
+LONGEST, WIDEST, SHARPEST = 0.0708, 0.04, math.radians(22.6)  # [m, m, rad] limits of one pair of steps
 PAIRS = 6  # most pairs of steps in one primitive
 
 
 @dataclass(frozen=True)
 class Request:
-    """One primitive: a displacement of the home posture, which stance it is walked in, and how long it takes.
+    """One primitive: a displacement of the home posture, the stance in which it is walked, and its duration.
 
-    Table 2's five primitives are `straight`, `turn`, `step` (up and down) and `gate`; `squat`, `stand` and any mixture
-    of forward, left and turn are requests too.
+    The five primitives of Table 2 are `straight`, `turn`, `step` (up and down) and `gate`; `squat`, `stand` and any
+    mixture of forward, left and turn are requests too.
     """
 
     name: str
     forward: float = 0.0  # [m]
     left: float = 0.0  # [m]
     turn: float = 0.0  # [rad] anticlockwise
-    rise: float = 0.0  # [m] of the ground beyond an edge
+    rise: float = 0.0  # [m] rise of the ground beyond an edge
     squat_start: bool = False
     squat: bool = False  # while walking
     squat_end: bool = False
     duration: float = 16.0  # [s]
-    lean: float = 0.0  # [m] off a foot's middle, away from the edge, where it bears the weight on the upper ground
+    lean: float = 0.0  # [m] of the load on the upper ground: from the foot's middle, away from the edge
 
     def __post_init__(self):
         for field in ("forward", "left", "turn", "rise", "duration", "lean"):
@@ -50,14 +50,14 @@ class Request:
 
     @property
     def pairs(self) -> int:
-        """Pairs of steps; none where the feet stay. A rise is climbed in one, whatever its length."""
+        """Pairs of steps; none if the feet stay. A rise is climbed in one, whatever its length."""
         if self.rise:
             return 1
         parts = abs(self.forward) / LONGEST, abs(self.left) / WIDEST, abs(self.turn) / SHARPEST
         return math.ceil(max(parts) - 1e-6)
 
     def lasting(self, duration: float) -> Request:
-        """The same in other time [s]."""
+        """The same request with another duration [s]."""
         return dataclasses.replace(self, duration=duration)
 
 
@@ -65,7 +65,7 @@ TABLE_2 = DurationConfig()
 
 
 def straight(length: float, squat: bool = False) -> Request:
-    """Straight-forward, in Table 2's time; `squat` from squat to squat."""
+    """Straight-forward, in Table 2's time; with `squat`, from squat to squat."""
     return Request("straight", length, squat_start=squat, squat=squat, squat_end=squat,
                    duration=TABLE_2.straight * max(abs(length), CELL / 5) / CELL)  # fmt: skip
 
@@ -89,15 +89,15 @@ def gate(length: float) -> Request:
 
 
 def squat(duration: float = 8.0) -> Request:
-    """Get down."""
+    """Squat down."""
     return Request("squat", squat=True, squat_end=True, duration=duration)
 
 
 def stand(duration: float = 8.0) -> Request:
-    """Get up."""
+    """Stand up."""
     return Request("stand", squat_start=True, squat=True, duration=duration)
 
 
 def sidestep(left: float, squat: bool = False, duration: float = 8.0) -> Request:
-    """To the side."""
+    """Step sideways."""
     return Request("sidestep", left=left, squat_start=squat, squat=squat, squat_end=squat, duration=duration)

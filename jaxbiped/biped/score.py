@@ -1,4 +1,4 @@
-"""A movement as a score: phases in time, and in each phase what moves by how much."""
+"""A movement as a score: phases in time, and in each phase which channels move by how much."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from jaxtyping import Array, Float
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.request import Request
 
-PHASES, RAMPS = 32, 96  # static sizes: what six pairs of steps need
+PHASES, RAMPS = 32, 96  # static sizes: enough for six pairs of steps
 FEET = tuple(f"{side}_{c}" for side in ("left", "right") for c in ("x", "y", "z", "yaw"))
 CHANNELS = ("zmp_x", "zmp_y", "load", "hip", *FEET)
-CLEARANCE = 0.015  # [m] of a swinging foot above the higher of the two grounds
-SLACK = 0.006  # [m] that the stretched leg keeps short of straight
+CLEARANCE = 0.015  # [m] clearance of a swinging foot above the higher of the two grounds
+SLACK = 0.006  # [m] distance of the stretched leg from straight
 SHORTEST_REST = 0.30  # [s] twice the pendulum's time constant: the centre of mass is at rest at both ends
 
 
@@ -28,14 +28,14 @@ class Score:
 
     durations: Float[Array, "P"]  # [s] of the phases
     start: Float[Array, "C"]  # values of CHANNELS at time 0
-    phase: Float[Array, "R"]  # of each ramp: its phase's index
-    window: Float[Array, "R 2"]  # and the parts of that phase where it starts and ends
-    delta: Float[Array, "R C"]  # and by how much it moves each channel
+    phase: Float[Array, "R"]  # phase index of each ramp
+    window: Float[Array, "R 2"]  # fractions of that phase at which it starts and ends
+    delta: Float[Array, "R C"]  # change of each channel
     swing: Float[Array, "P 2"]  # 1 where the left, the right foot is in the air
 
 
 class Composer:
-    """Writes a score phase by phase, keeping track of where feet, hips and zero moment point are."""
+    """Writes a score phase by phase, keeping track of feet, hips and zero moment point."""
 
     def __init__(self, start: dict[str, float]):
         self.start, self.now = dict(start), dict(start)
@@ -45,7 +45,7 @@ class Composer:
         self.ramps: list[tuple[int, float, float, dict[str, float]]] = []
 
     def phase(self, name: str, weight: float, swing: tuple[int, int] = (0, 0)) -> None:
-        """Begin a phase; `weight` is its part of the time."""
+        """Begin a phase; `weight` is its share of the time."""
         self.names.append(name)
         self.weights.append(weight)
         self.swing.append(swing)
@@ -57,7 +57,7 @@ class Composer:
         self.now.update(targets)
 
     def score(self, durations: np.ndarray) -> Score:
-        """Padded to static sizes. More phases or ramps than fit are a programming error."""
+        """The score, padded to static sizes. Too many phases or ramps are a programming error."""
         P, R, C = PHASES, RAMPS, len(CHANNELS)
         padded, swing = np.zeros(P), np.zeros((P, 2))
         padded[: len(durations)], swing[: len(self.swing)] = durations, self.swing
@@ -73,7 +73,7 @@ class Composer:
 def compose(request: Request, robot: RobotModelConfig) -> Composer:
     """The phases of a request: rest, then pairs of steps (shift, swing, shift, swing), shift to the middle, rest.
 
-    The foot on the side of the way steps first: the left one ahead, to the left and in left turns. Heights of the hips
+    The foot on the side of the motion steps first: the left one for forward, left and left turns. Heights of the hips
     change while the zero moment point rests. A rising foot is up before it moves ahead, a falling one is ahead before
     it moves down, so that neither touches the edge.
     """
@@ -135,7 +135,7 @@ def hip_height(request: Request, robot: RobotModelConfig) -> float:
     stance, body, masses = robot.stance, robot.proportions, robot.masses
     height = stance.squatting if request.squat else stance.climbing if request.rise else stance.walking
     pairs = max(1, request.pairs)
-    moving = masses.torso + 1.5 * masses.thigh + 0.5 * masses.shank  # what of both legs goes with the pelvis
+    moving = masses.torso + 1.5 * masses.thigh + 0.5 * masses.shank  # the part of both legs that moves with the pelvis
     lead = 1.0 + (masses.foot + 0.75 * masses.shank + 0.25 * masses.thigh) / moving
     ahead = lead * (abs(request.forward) / pairs + max(0.0, request.lean))
     inward = stance.inward_climbing if request.rise else stance.inward
@@ -146,7 +146,7 @@ def hip_height(request: Request, robot: RobotModelConfig) -> float:
 
 
 def schedule(song: Composer, duration: float) -> np.ndarray:
-    """Durations [s] of the phases: by weight, but no rest at the ends shorter than the pendulum needs."""
+    """Durations [s] of the phases: by weight, but with rests at the ends no shorter than the pendulum needs."""
     weights = np.array(song.weights)
     durations = duration * weights / weights.sum()
     ends = np.zeros(len(weights), bool)
@@ -164,14 +164,14 @@ def _home(hip: float, offset: float) -> dict[str, float]:
 
 
 def _pressure(now: dict[str, float], side: str, ahead: float, inward: float) -> tuple[float, float]:
-    """Where a foot bears the whole weight: `ahead` of its middle and `inward` of it."""
+    """Where a foot carries the whole weight: `ahead` of its middle and `inward` of it."""
     cos, sin = math.cos(now[f"{side}_yaw"]), math.sin(now[f"{side}_yaw"])
     left = -inward if side == "left" else inward
     return now[f"{side}_x"] + ahead * cos - left * sin, now[f"{side}_y"] + ahead * sin + left * cos
 
 
 def ramp(part: Float[Array, "*N"]) -> Float[Array, "*N"]:
-    """From 0 to 1 with least jerk, at rest at and beyond both ends."""
+    """From 0 to 1 with minimum jerk, at rest at and beyond both ends."""
     s = jnp.clip(part, 0.0, 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
 

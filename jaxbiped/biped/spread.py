@@ -1,4 +1,4 @@
-"""Sets of disturbances that primitives are verified on, each drawn from a seed."""
+"""Sets of disturbances for the verification of primitives, each drawn from a seed."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ Factor = Annotated[float, pydantic.Field(gt=0.0)]
 
 
 class DisturbanceSet(Model):
-    """How far each disturbance goes: evenly from the first number to the second, or as far to both sides of none."""
+    """Range of each disturbance: uniform from the first number to the second, or to both sides of zero."""
 
     friction: tuple[Factor, Factor] = (0.8, 0.8)
-    """Between feet and ground."""
+    """Friction between feet and ground."""
     mass: tuple[Factor, Factor] = (1.0, 1.0)
     """Factor on all masses."""
     rise: Spread = 0.0
-    """[m] that the bump is higher or lower than known."""
+    """[m] Error of the bump's height."""
     edge: Spread = 0.0
-    """[m] that the bump's edge is nearer or farther than known."""
+    """[m] Error of the distance of the bump's edge."""
     yaw: Spread = 0.0
-    """[deg] that the edge, or the gate, is turned."""
+    """[deg] Rotation of the edge, or of the gate."""
     lateral: Spread = 0.0
-    """[m] that the gate lies to the side."""
+    """[m] Lateral offset of the gate."""
     slope: Spread = 0.0
-    """[deg] of the ground ahead."""
+    """[deg] Slope of the ground ahead."""
     servo: Spread = 0.0
-    """[deg] standard deviation of the zero offset of each servo; normal."""
+    """[deg] Standard deviation of the zero offset of each servo; normal."""
 
     def draw(self, rng: np.random.Generator) -> Disturbance:
-        """One disturbance; consumes 7 uniform and 12 normal numbers, whatever the spreads, so that sets are paired."""
+        """One disturbance; consumes 7 uniform and 12 normal numbers, whatever the ranges, so that sets are paired."""
         unit = rng.uniform(-1.0, 1.0, 7)
         between = lambda limits, u: limits[0] + (limits[1] - limits[0]) * (u + 1) / 2  # noqa: E731
         offsets = math.radians(self.servo) * rng.standard_normal(len(SIDES) * len(JOINTS))
@@ -59,9 +59,9 @@ class DisturbanceSet(Model):
 
 
 MILD = DisturbanceSet(friction=(0.4, 1.2), mass=(0.8, 1.2), rise=0.003, yaw=3.0, lateral=0.005)
-"""What every primitive must bear."""
+"""Disturbances that every primitive must tolerate."""
 HARD = DisturbanceSet(
     friction=(0.2, 1.2), mass=(0.7, 1.3), rise=0.010, edge=0.020, yaw=12.0, lateral=0.010, slope=4.0, servo=1.5
 )
-"""Strong enough to make some fail of every primitive that moves the feet."""
+"""Disturbances strong enough that every primitive that moves the feet fails sometimes."""
 SETS = {"mild": MILD, "hard": HARD}

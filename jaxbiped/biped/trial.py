@@ -1,4 +1,4 @@
-"""One primitive, played once in C MuJoCo under a disturbance, and what came of it."""
+"""One primitive, played once in C MuJoCo under a disturbance, and its outcome."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from jaxbiped.biped.model import add_terrain, home_qpos, part_geoms, robot_spec,
 from jaxbiped.biped.request import Request
 from jaxbiped.config import Model
 
-SETTLE = 0.4  # [s] that the robot stands before and after the primitive
-WINDOW = 10  # steps (50 ms) that contact forces are averaged over, less than the pendulum's time constant
+SETTLE = 0.4  # [s] standing time before and after the primitive
+WINDOW = 10  # steps (50 ms) over which contact forces are averaged, less than the pendulum's time constant
 
 
 RIMS = ("up ahead", "up aside", "down ahead", "down aside")  # of one step's height, ahead or to the left
@@ -24,48 +24,48 @@ STEP = 0.03  # [m] height of a rim
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What differs from what the primitive was made for; by default nothing."""
+    """Deviations from the nominal conditions of a primitive; by default none."""
 
     friction: float = 0.8
     mass: float = 1.0  # factor on all masses
-    rise: float = 0.0  # [m] that the bump is higher than known
-    edge: float = 0.0  # [m] that the edge is further away than the nominal one
-    yaw: float = 0.0  # [rad] that the edge, or the gate, is turned
-    lateral: float = 0.0  # [m] that the gate lies to the left
+    rise: float = 0.0  # [m] by which the bump is higher than known
+    edge: float = 0.0  # [m] by which the edge is farther away than the nominal one
+    yaw: float = 0.0  # [rad] rotation of the edge, or of the gate
+    lateral: float = 0.0  # [m] offset of the gate to the left
     servo: tuple[float, ...] = (0.0,) * (2 * len(JOINTS))  # [rad] zero offset of each servo
-    slope: float = 0.0  # [rad] of all ground, rising ahead
-    clearance: float = 0.37  # [m] under the gate's lintel
-    rim: str = ""  # one of RIMS: an edge that the primitive does not know of, `edge` [m] from where the robot starts
+    slope: float = 0.0  # [rad] slope of all ground, rising ahead
+    clearance: float = 0.37  # [m] height under the gate's lintel
+    rim: str = ""  # one of RIMS: an edge unknown to the primitive, `edge` [m] from the robot's start
 
 
 class Tolerance(Model):
-    """What counts as success of a primitive."""
+    """Conditions for the success of a primitive."""
 
     placement: float = 0.010
-    """[m] of the middle between the feet."""
+    """[m] Position error of the midpoint of the feet."""
     yaw: float = math.radians(10.0)
     """[rad]"""
     height: float = 0.005
-    """[m] of each sole above or below the ground that it should stand on."""
+    """[m] Distance of each sole from the ground that it should stand on."""
     upright: float = math.radians(10.0)
-    """[rad] that the torso may end off the vertical of the ground."""
+    """[rad] Final angle of the torso from the vertical of the ground."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the robot ended; error in the frame of the start, actual minus requested."""
+    """The final state of the robot; error in the frame of the start, actual minus requested."""
 
-    error: np.ndarray  # [3] (x, y) [m] and yaw [rad] of the middle between the feet
-    height: float  # [m] greatest distance of a sole from its ground
+    error: np.ndarray  # [3] (x, y) [m] and yaw [rad] of the midpoint of the feet
+    height: float  # [m] largest distance of a sole from its ground
     tilt: float  # [rad] of the torso at the end
     head_contact: bool  # of head or torso with anything, at any time
     warnings: int  # of the engine
-    zmp_margin: float  # [m] least, from contact forces; NaN if not recorded
+    zmp_margin: float  # [m] smallest, from contact forces; NaN if not recorded
     peak_torque: float  # [Nm] of any servo
     peak_speed: float  # [rad/s] of any joint
 
     def success(self, tolerance: Tolerance) -> bool:
-        """Upright, both feet where they should be, nothing touched."""
+        """Whether it is upright, has both feet where they should be, and touched nothing."""
         return bool(
             np.hypot(*self.error[:2]) <= tolerance.placement
             and abs(self.error[2]) <= tolerance.yaw
@@ -87,17 +87,17 @@ def nominal_edge(request: Request, robot: RobotModelConfig) -> float:
 
 
 def passes_gate(request: Request) -> bool:
-    """Whether a primitive is one that squats, walks and stands up: its trials have a gate."""
+    """Whether a primitive squats, walks and stands up: its trials have a gate."""
     return request.squat and not request.squat_start and not request.squat_end
 
 
 def boxes_of(request: Request, *disturbances: Disturbance) -> int:
-    """Boxes that trials of a primitive need: a bump, or two posts and a lintel, or a rim."""
+    """Number of boxes in trials of a primitive: a bump, or two posts and a lintel, or a rim."""
     return 1 if request.rise else 3 if passes_gate(request) else int(any(d.rim for d in disturbances))
 
 
 def ground_after(request: Request, d: Disturbance) -> float:
-    """Height [m] of the ground that the robot should stand on in the end."""
+    """Height [m] of the ground that the robot should stand on at the end."""
     if d.rim:
         return STEP if d.rim.startswith("down") else 0.0
     return request.rise + d.rise if request.rise > 0 else 0.0
@@ -124,11 +124,11 @@ def lay_out(model: mujoco.MjModel, table: PrimitiveTable, robot: RobotModelConfi
         start = height if request.rise < 0 else 0.0
         set_box(model, 0, tuple(edge + sign * half * heading), d.yaw, (half, half), -0.1, height)
     elif passes_gate(request):
-        head = home_table(robot, False).pelvis[-1, 0]  # which is not above the middle between the feet
+        head = home_table(robot, False).pelvis[-1, 0]  # which is not above the midpoint of the feet
         middle, side = np.array([request.forward / 2 + head, d.lateral]), 0.16
         thick = max(
             0.004, request.forward / 2 - 0.05
-        )  # 5 cm clear of the head at both ends, where the way is long enough
+        )  # 5 cm clear of the head at both ends, if the path is long enough
         across = side * np.array([-heading[1], heading[0]])
         for slot, place in enumerate((middle + across, middle - across)):
             set_box(model, slot, tuple(place), d.yaw, (thick, 0.02), 0.0, d.clearance)
@@ -179,10 +179,10 @@ def play(table: PrimitiveTable, robot: RobotModelConfig, d: Disturbance | None =
 
 
 def ground_force(model: mujoco.MjModel, data: mujoco.MjData, foot_of: list[int]) -> np.ndarray:
-    """[2, 3] of the left and the right foot: upward force [N], and the force times x and times y [Nm].
+    """[2, 3] for the left and the right foot: upward force [N], and the force times x and times y [Nm].
 
     Args:
-      foot_of: of each geom, 0 or 1 where it belongs to the left or the right foot, else -1.
+      foot_of: for each geom, 0 or 1 if it belongs to the left or the right foot, else -1.
     """
     force, feet = np.zeros(6), np.zeros((2, 3))
     for k, (one, other) in enumerate(data.contact.geom.tolist()):
@@ -196,10 +196,10 @@ def ground_force(model: mujoco.MjModel, data: mujoco.MjData, foot_of: list[int])
 
 
 def contact_margin(data: mujoco.MjData, robot: RobotModelConfig, feet: np.ndarray) -> float:
-    """Distance [m] of the zero moment point from the edge of the hull of the soles that bear weight; -inf in the air.
+    """Distance [m] of the zero moment point from the edge of the hull of the loaded soles; -inf in the air.
 
     Args:
-      feet: `ground_force`, summed over a short while, because single contacts of a simulation chatter.
+      feet: `ground_force`, summed over a short time, because single contacts of a simulation chatter.
     """
     bearing = [side for s, side in enumerate(SIDES) if feet[s, 0] > 1e-3]
     if not bearing:
@@ -215,12 +215,12 @@ def contact_margin(data: mujoco.MjData, robot: RobotModelConfig, feet: np.ndarra
 
 
 def stand(data: mujoco.MjData) -> np.ndarray:
-    """[3] where the robot stands: the middle between its soles."""
+    """[3] Position of the robot: the midpoint of its soles."""
     return middle_of(np.stack([data.site(f"sole_{side}").xpos for side in SIDES]))
 
 
 def middle_of(soles: np.ndarray) -> np.ndarray:
-    """[..., 3] (x, y, yaw) of the middle between two soles [..., 2, 2 or 3]: the left and the right."""
+    """[..., 3] (x, y, yaw) of the midpoint of two soles [..., 2, 2 or 3]: the left and the right."""
     left, right = soles[..., 0, :2], soles[..., 1, :2]
     across = left - right
     yaw = np.arctan2(-across[..., 0], across[..., 1])
@@ -228,7 +228,7 @@ def middle_of(soles: np.ndarray) -> np.ndarray:
 
 
 def relative(pose: np.ndarray, frame: np.ndarray) -> np.ndarray:
-    """[..., 3] a pose (x, y, yaw) in the frame of another."""
+    """[..., 3] A pose (x, y, yaw) in the frame of another."""
     c, s = np.cos(frame[..., 2]), np.sin(frame[..., 2])
     dx, dy, turn = (pose[..., k] - frame[..., k] for k in range(3))
     return np.stack([c * dx + s * dy, -s * dx + c * dy, (turn + math.pi) % (2 * math.pi) - math.pi], axis=-1)

@@ -1,4 +1,4 @@
-"""Many trials of one primitive at once, in any backend: what `trial.play` does one by one, and more measured of it.
+"""Many trials of one primitive at once, in any backend: like `trial.play`, but batched and with more measurements.
 
 Each simulation of the batch has its own disturbance: its friction, masses, gravity and boxes are fields of the model,
 its servo offsets are in its control table. The robot carries instruments: poses of the soles, force sensors in the
@@ -35,45 +35,45 @@ from jaxbiped.biped.trial import (
 from jaxbiped.physics.backend import Backend, Rollout
 
 VARIED = ("geom_friction", "body_mass", "body_inertia", "opt.gravity", "geom_pos", "geom_size", "geom_quat")
-ROOM = 40_000_000  # numbers that one block of trials may record: 320 MB
-SLOTS = 24  # contacts of a simulation that MJX keeps; more than that make it invalid, which is seen
-BEARING = 0.02  # share of the robot's weight from which on a foot bears some of it
-LANDING = 0.1  # [s] after its touch-down from which on a foot's movement on the ground is slip
-EVERY = 2  # steps between two looks at the zero moment point
+ROOM = 40_000_000  # most numbers recorded for one block of trials: 320 MB
+SLOTS = 24  # contacts of a simulation that MJX keeps; more make it invalid, which is detected
+BEARING = 0.02  # share of the robot's weight from which a foot counts as loaded
+LANDING = 0.1  # [s] after touch-down, from which a foot's movement on the ground counts as slip
+EVERY = 2  # steps between two evaluations of the zero moment point
 
 
 @dataclass(frozen=True)
 class Trials:
-    """What came of each trial, [B]. Errors are in the frame of the start, actual minus requested.
+    """The outcome of each trial, [B]. Errors are in the frame of the start, actual minus requested.
 
-    What needs records of every step is NaN where they were not asked for.
+    Values that need records of every step are NaN if these were not requested.
     """
 
-    error: Float[np.ndarray, "B 3"]  # (x, y) [m] and yaw [rad] of the middle between the feet
-    height: Float[np.ndarray, "B"]  # [m] greatest distance of a sole from its ground
+    error: Float[np.ndarray, "B 3"]  # (x, y) [m] and yaw [rad] of the midpoint of the feet
+    height: Float[np.ndarray, "B"]  # [m] largest distance of a sole from its ground
     tilt: Float[np.ndarray, "B"]  # [rad] of the torso at the end
-    touched: Bool[np.ndarray, "B"]  # head or torso, anything, at any time
-    warnings: Int[np.ndarray, "B"]  # of the engine; any make a trial invalid, and its other numbers NaN
-    slip: Float[np.ndarray, "B"]  # [m] furthest that a foot moved on the ground between two swings
-    zmp_margin: Float[np.ndarray, "B"]  # [m] least, from the forces on the feet; -inf in the air
+    touched: Bool[np.ndarray, "B"]  # whether head or torso touched anything at any time
+    warnings: Int[np.ndarray, "B"]  # of the engine; any of them makes a trial invalid, and its other numbers NaN
+    slip: Float[np.ndarray, "B"]  # [m] largest movement of a foot on the ground between two swings
+    zmp_margin: Float[np.ndarray, "B"]  # [m] smallest, from the forces on the feet; -inf in the air
     peak_torque: Float[np.ndarray, "B"]  # [Nm] of any servo
     peak_speed: Float[np.ndarray, "B"]  # [rad/s] of any joint
-    energy: Float[np.ndarray, "B"]  # [J] of work that the servos did, braking not counted
-    head_clearance: Float[np.ndarray, "B"]  # [m] least, of the head under the lintel; NaN where there is none
-    sway: Float[np.ndarray, "B"]  # [m] furthest that the head's middle came off the way between start and end
+    energy: Float[np.ndarray, "B"]  # [J] work done by the servos, without braking
+    head_clearance: Float[np.ndarray, "B"]  # [m] smallest, of the head under the lintel; NaN if there is none
+    sway: Float[np.ndarray, "B"]  # [m] largest distance of the head's middle from the line between start and end
 
     def fell(self, tolerance: Tolerance) -> Bool[np.ndarray, "B"]:
-        """Not upright on the ground that it should stand on, or not valid."""
+        """Whether it is not upright on the ground that it should stand on, or not valid."""
         upright = (self.tilt <= tolerance.upright) & (self.height <= tolerance.height)
         return ~upright | (self.warnings > 0)
 
     def slipped(self, tolerance: Tolerance) -> Bool[np.ndarray, "B"]:
-        """Upright, but elsewhere than it should be."""
+        """Whether it is upright, but in the wrong place."""
         near = np.hypot(self.error[:, 0], self.error[:, 1]) <= tolerance.placement
         return ~self.fell(tolerance) & ~(near & (np.abs(self.error[:, 2]) <= tolerance.yaw))
 
     def success(self, tolerance: Tolerance) -> Bool[np.ndarray, "B"]:
-        """Upright, both feet where they should be, nothing touched."""
+        """Whether it is upright, has both feet where they should be, and touched nothing."""
         return ~self.fell(tolerance) & ~self.slipped(tolerance) & ~self.touched
 
 
@@ -111,11 +111,11 @@ def trials(
     """Stand, play the primitive, stand again, once for each disturbance.
 
     Args:
-      backend: of `physics.make`; `options` go there.
-      record: measure what needs a record of every step; without, only where the robot ends.
+      backend: name for `physics.make`, which gets `options`.
+      record: measure what needs a record of every step; otherwise only where the robot ends.
 
     Raises:
-      InputError: about the backend, or what it refuses.
+      InputError: an unknown backend, or something that it rejects.
     """
     steps = len(table.ctrl) + 2 * round(SETTLE / table.timestep)
     width = 80 if record else 4
@@ -137,7 +137,7 @@ def trials(
 def roll(
     backend: Backend, table: PrimitiveTable, robot: RobotModelConfig, disturbances: Sequence[Disturbance], record: bool
 ) -> Rollout:
-    """The primitive in a batch of laid out worlds; records of every step, or of a few that hold start and end."""
+    """Play the primitive in a batch of prepared worlds; records of every step, or of a few with start and end."""
     home, rest = home_table(robot, table.request.squat_start), round(SETTLE / table.timestep)
     before, after = np.tile(home.ctrl[-1], (rest, 1)), np.tile(table.ctrl[-1], (rest, 1))
     control = np.concatenate([before, table.ctrl, after])
@@ -208,7 +208,7 @@ def address(model: mujoco.MjModel, name: str) -> np.ndarray:
 
 
 def slip(soles: Float[np.ndarray, "B R 2 2"], table: PrimitiveTable) -> Float[np.ndarray, "B"]:
-    """Furthest [m] that a foot moved on the ground between two swings."""
+    """Largest movement [m] of a foot on the ground between two swings."""
     still = np.abs(np.diff(table.feet, axis=0)).max(axis=2) < 1e-7
     furthest = np.zeros(len(soles))
     for s in range(2):
@@ -222,11 +222,11 @@ def slip(soles: Float[np.ndarray, "B R 2 2"], table: PrimitiveTable) -> Float[np
 
 
 def zmp_margin(read, soles, robot: RobotModelConfig, mass: Float[np.ndarray, "B"]) -> Float[np.ndarray, "B N"]:
-    """Distance [m] of the zero moment point from the edge of the hull of the soles that bear weight; -inf in the air.
+    """Distance [m] of the zero moment point from the edge of the hull of the loaded soles; -inf in the air.
 
-    As a robot measures it: each ankle's force sensor, less the foot's own weight, says where the foot bears how much.
-    Forces are summed over 50 ms, because contacts of a simulation chatter. The result holds +inf where it was not
-    looked at.
+    As a robot measures it: each ankle's force sensor, minus the foot's own weight, gives position and size of the
+    foot's load. Forces are summed over 50 ms, because contacts of a simulation chatter. The result holds +inf where it
+    was not evaluated.
     """
     records = soles.shape[1]
     weight = GRAVITY * robot.masses.total * mass
@@ -267,7 +267,7 @@ def clearance(
     robot: RobotModelConfig,
     disturbances: Sequence[Disturbance],
 ) -> Float[np.ndarray, "B"]:
-    """Least height [m] between the camera's top and the lintel's bottom, while it is below or within 5 cm of it."""
+    """Smallest height [m] between the camera's top and the lintel's bottom, while it is below or within 5 cm of it."""
     lintel = np.array([d.clearance for d in disturbances])[:, None]
     middle = table.request.forward / 2 + home_table(robot, False).pelvis[-1, 0]
     half = max(0.004, table.request.forward / 2 - 0.05)
@@ -278,7 +278,7 @@ def clearance(
 def sway(
     head: Float[np.ndarray, "B R 2"], start: Float[np.ndarray, "B 2"], way: Float[np.ndarray, "B 2"]
 ) -> Float[np.ndarray, "B"]:
-    """Furthest [m] that the head came to the side of the straight way."""
+    """Largest lateral distance [m] of the head from the straight path."""
     length = np.hypot(way[:, 0], way[:, 1])
     ahead = np.where(length[:, None] > 1e-3, way / np.maximum(length, 1e-3)[:, None], [1.0, 0.0])
     off = head - start[:, None]

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from jaxbiped.biped.config import GRAVITY
 from jaxbiped.biped.leg import Biped, leg_angles, leg_frames, rot_z
 
-ROUNDS = 5  # of the fixed point: each leaves less than a tenth of the error
+ROUNDS = 5  # iterations of the fixed point: each leaves less than a tenth of the error
 
 
 @jax.tree_util.register_dataclass
@@ -20,11 +20,11 @@ class Posture:
     """The robot at one moment, torso upright."""
 
     q: Float[Array, "12"]  # [rad] joint angles, left leg first
-    pelvis: Float[Array, "3"]  # [m] middle between the hips
+    pelvis: Float[Array, "3"]  # [m] midpoint of the hips
     yaw: Float[Array, ""]  # [rad] of the torso
     links: Float[Array, "7 3"]  # [m] centres of mass: torso, then thigh, shank, foot of the left leg and of the right
-    slack: Float[Array, "2"]  # [m] how much further each leg could reach; negative: out of reach
-    torque: Float[Array, "12"]  # [Nm] that the joints need at rest
+    slack: Float[Array, "2"]  # [m] remaining reach of each leg; negative: out of reach
+    torque: Float[Array, "12"]  # [Nm] needed by the joints at rest
 
 
 def sole_frame(foot: Float[Array, "4"], height: Float[Array, ""]) -> tuple[Float[Array, "3"], Float[Array, "3 3"]]:
@@ -47,13 +47,13 @@ def posture(
 ) -> Posture:
     """The posture that stands on two given soles with its centre of mass above a point.
 
-    The pelvis follows the centre of mass of all links by fixed point. The torso is upright and turned half way between
-    the feet.
+    The pelvis follows the centre of mass of all links by fixed-point iteration. The torso is upright and its yaw is
+    half way between the feet.
 
     Args:
       com: (x, y) [m] of the centre of mass; hip_height: z [m] of the hips.
       feet: (x, y, z, yaw) of the left and the right sole.
-      load: share of the weight on the left foot; pressure: the (x, y) [m] where each foot bears it.
+      load: share of the weight on the left foot; pressure: the (x, y) [m] where each foot carries it.
     """
     masses = link_masses(biped)
     yaw = jnp.mean(feet[:, 3])
@@ -73,7 +73,7 @@ def posture(
         torso = pelvis + jnp.array([0.0, 0.0, 1.0]) * biped.centres[0]
         return pelvis, q, slack, origins, axes, jnp.concatenate([torso[None], legs.reshape(6, 3)])
 
-    # The torso follows the pelvis wholly, thighs three quarters of the way, shanks one quarter.
+    # The torso follows the pelvis fully, thighs by three quarters, shanks by one quarter.
     share = (biped.masses[0] + 1.5 * biped.masses[1] + 0.5 * biped.masses[2]) / jnp.sum(masses)
 
     def improve(pelvis_xy, _):
@@ -99,7 +99,7 @@ def _holding_torque(
     weight: Float[Array, ""],
     pressure: Float[Array, "2"],
 ) -> Float[Array, "6"]:
-    """Torques [Nm] of one leg at rest: each joint bears the links below it and the vertical force on its foot."""
+    """Torques [Nm] of one leg at rest: each joint carries the links below it and the vertical force on its foot."""
     below = jnp.array([[1, 1, 1], [1, 1, 1], [1, 1, 1], [0, 1, 1], [0, 0, 1], [0, 0, 1]], jnp.float32)
     origin = origins[jnp.array([0, 0, 0, 1, 2, 2])]
     forces = jnp.concatenate([-GRAVITY * biped.masses[1:] * below, jnp.broadcast_to(weight, (6, 1))], axis=1)

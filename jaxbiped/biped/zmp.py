@@ -12,14 +12,14 @@ from jaxbiped.biped.config import GRAVITY
 def com_from_zmp(
     zmp: Float[Array, "N 2"], height: Float[Array, ""] | float, dt: Float[Array, ""] | float
 ) -> Float[Array, "N 2"]:
-    """Centre of mass whose pendulum has the given zero moment point: c - (z/g) c'' = p, c = p at both ends.
+    """Centre of mass of the pendulum with the given zero moment point: c - (z/g) c'' = p, c = p at both ends.
 
     Central differences make this a tridiagonal system, diagonally dominant for every `dt`. The solution looks ahead
     by the pendulum's time constant sqrt(z/g), about 0.15 s: where p rests long at both ends, c is at rest there too.
 
     Args:
       zmp: [m] at times `dt` [s] apart.
-      height: [m] of the centre of mass above the ground, as if constant.
+      height: [m] height of the centre of mass above the ground, assumed constant.
     """
     ratio = height / (GRAVITY * dt**2)
     inner = jnp.ones(zmp.shape[0]).at[jnp.array([0, -1])].set(0.0)
@@ -28,7 +28,7 @@ def com_from_zmp(
 
 
 def second_difference(values: Float[Array, "N *C"], dt: Float[Array, ""] | float) -> Float[Array, "N *C"]:
-    """Acceleration by central differences; none at both ends, where movements rest."""
+    """Acceleration by central differences; zero at both ends, where movements rest."""
     inner = (values[2:] - 2 * values[1:-1] + values[:-2]) / dt**2
     none = jnp.zeros_like(values[:1])
     return jnp.concatenate([none, inner, none])
@@ -40,7 +40,7 @@ def zmp_of_masses(
     ground: Float[Array, "N"],
     dt: Float[Array, ""] | float,
 ) -> Float[Array, "N 2"]:
-    """Zero moment point [m] of moving point masses, on the height `ground` [m]; spins of the links are left out."""
+    """Zero moment point [m] of moving point masses, at the height `ground` [m]; spins of the links are neglected."""
     acceleration = second_difference(points, dt)
     weight = masses * (acceleration[..., 2] + GRAVITY)
     arm = points[..., 2] - ground[:, None]

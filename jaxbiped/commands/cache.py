@@ -1,4 +1,4 @@
-"""`jaxbiped cache`: what is kept on disk between processes, shown or cleared."""
+"""`jaxbiped cache`: show or clear what is kept on disk between processes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jaxbiped.core.cache_location import KERNELS, MOST_PROGRAMS, OFF, PROGRAMS, 
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
 
-PARTS = {KERNELS: "kernels of Numba", PROGRAMS: "programs of XLA"}
+PARTS = {KERNELS: "Numba kernels", PROGRAMS: "XLA programs"}
 UNITS = ("B", "kB", "MB", "GB")
 
 
@@ -22,12 +22,12 @@ def main(args: CacheArgs) -> int:
       Exit status 0.
 
     Raises:
-      InputError: with `clear`, something that cannot be removed; all else is removed.
+      InputError: with `clear`, a file that cannot be removed; all others are removed.
     """
     folder = cache_folder()
     if folder is None:
         off = os.environ.get(VARIABLE, "").strip().lower() == OFF
-        print(f"nothing is kept: {f'{VARIABLE} is {OFF}' if off else 'this user has no folder'}")
+        print(f"nothing is kept: {f'{VARIABLE} is {OFF}' if off else 'this user has no cache folder'}")
         return 0
     print(f"folder    {folder}{state(folder)}")
     for name, what in PARTS.items():
@@ -42,17 +42,17 @@ def main(args: CacheArgs) -> int:
 
 
 def state(folder: Path) -> str:
-    """What is said of a folder in which nothing can be kept, or nothing is yet."""
+    """A note on a cache folder that is missing or cannot be used; otherwise an empty string."""
     if folder.exists() and not folder.is_dir():
-        return " (no folder: nothing is kept)"
+        return " (not a folder: nothing is kept)"
     nearest = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     if not nearest.is_dir() or not os.access(nearest, os.W_OK | os.X_OK):
-        return " (cannot be written to: nothing is added)"
-    return "" if folder.exists() else " (not there yet)"
+        return " (not writable: nothing is added)"
+    return "" if folder.exists() else " (does not exist yet)"
 
 
 def clear(folder: Path) -> None:
-    """Remove the files of a folder, and the folder; `InputError` about the first that cannot be."""
+    """Remove a folder and the files in it; raise `InputError` about the first that cannot be removed."""
     first = None
     for file in kept_files.files(folder):
         try:
@@ -65,7 +65,7 @@ def clear(folder: Path) -> None:
 
 
 def amount(size: int) -> str:
-    """Bytes, for people."""
+    """A number of bytes as readable text."""
     value, units = float(size), list(UNITS)
     while value >= 1000 and len(units) > 1:
         value, units = value / 1000, units[1:]

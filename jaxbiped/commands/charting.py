@@ -1,4 +1,4 @@
-"""What `stereo` and `classify` share: from points that stand upright to a map, its files and its pictures."""
+"""Shared by `stereo` and `classify`: from upright points to a map, its files and its pictures."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jaxbiped.mapping.scan_map import Chart, lay_out, make_chart
 def chart(
     points: Float[np.ndarray, "N 3"], args: ChartArgs, away_xy: tuple[float, float] = (0.0, 0.0), sparse: bool = False
 ) -> Chart:
-    """The map of points that stand upright; (x, y) = `away_xy` [m] is their origin on it."""
+    """Map upright points; (x, y) = `away_xy` [m] is the position of their origin on the map."""
     area = None
     if args.area is not None:
         area = tuple(side - away_xy[k // 2] for k, side in enumerate(args.area))
@@ -30,7 +30,7 @@ def chart(
 
 
 def say_cells(grid: class_grid.ClassGrid) -> str:
-    """The size of a map and its cells, for people."""
+    """The size of a map and its cells, as text."""
     rows, columns = grid.shape
     count = {cell.name.lower(): int((grid.classes == cell).sum()) for cell in Cell}
     cells = ", ".join(f"{number} {name}" for name, number in count.items() if number)

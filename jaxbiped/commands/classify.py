@@ -26,8 +26,8 @@ def main(args: ClassifyArgs) -> int:
       Exit status 0.
 
     Raises:
-      InputError: a cloud that cannot be used (none, damaged, empty, too wide for the pitch), options that do not go
-        together, no floor, a folder that exists or cannot be written.
+      InputError: an unusable cloud (missing, damaged, empty, too wide for the pitch), options that do not go together,
+        no floor, a folder that exists or cannot be written.
     """
     out = args.out or Path("results") / f"classify-{config_hash(args.model_copy(update={'out': None}))}"
     refuse_existing(out)
@@ -78,40 +78,38 @@ def check_options(args: ClassifyArgs) -> None:
 
 
 def stand(cloud: Cloud, args: ClassifyArgs) -> Upright:
-    """How the cloud is set upright; raise `InputError` when it shows no floor, or a larger plane outside the search."""
+    """Set the cloud upright; raise `InputError` if it shows no floor, or a larger plane outside the search cone."""
     up = None if args.up is None else np.array(args.up) / math.hypot(*args.up)
     if args.floor is not None:
         return set_upright(up, args.floor - float(up @ cloud.origin), np.median(cloud.points, axis=0).astype(float))
     upright = find_upright(cloud.points, up, math.radians(args.tilt), seed=args.seed)
     if upright is None:
-        known = "--floor" if up is not None else "--up X Y Z, and --floor where the floor is not in it"
+        known = "--floor" if up is not None else "--up X Y Z, and --floor if the floor is not in it"
         size = " x ".join(f"{float(f'{side:.3g}'):g}" for side in np.ptp(cloud.points, axis=0))
-        message = (
-            f"shows no floor that could be found in its {size} m; give {known} (and --scale, where it is not in metres)"
-        )
+        message = f"has no detectable floor in its {size} m; give {known} (and --scale, if it is not in metres)"
         raise InputError(message, file=args.cloud)
     if upright.rival is not None:
         x, y, z = (f"{v:.2f}" for v in upright.rival.up)
         message = (
-            f"shows a larger plane than the floor that was found, tilted by more than 30 degrees; give --up X Y Z "
-            f"({x} {y} {z} where that plane is the floor)"
+            f"shows a plane larger than the floor that was found and tilted by more than 30 degrees; give --up X Y Z "
+            f"({x} {y} {z} if that plane is the floor)"
         )
         raise InputError(message, file=args.cloud)
     return upright
 
 
 def dropped(cloud: Cloud) -> str:
-    """What is said of points that were not finite."""
-    return f"; {cloud.dropped} that are NaN or infinite dropped" if cloud.dropped else ""
+    """A note on points that were not finite."""
+    return f"; {cloud.dropped} NaN or infinite points dropped" if cloud.dropped else ""
 
 
 def say_floor(upright: Upright, cloud: Cloud) -> str:
-    """How the cloud was set upright, for people."""
+    """How the cloud was set upright, as text."""
     if upright.floor is None:
         return f"given: {upright.frame} is up"
     floor = upright.floor
     height = upright.height + float(FRAMES[upright.frame][2] @ cloud.origin)
     return (
-        f"found: {upright.frame} is up but for {math.degrees(upright.tilt):.2f} degrees, height {height:.3f} m; "
+        f"found: {upright.frame} is up, tilted by {math.degrees(upright.tilt):.2f} degrees, height {height:.3f} m; "
         f"{floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm"
     )

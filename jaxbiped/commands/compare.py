@@ -35,7 +35,7 @@ def main(args: CompareArgs) -> int:
     """
     config = StudyConfig.model_validate(args.model_dump(include=set(StudyConfig.model_fields)))
     config = fingerprinted(config)
-    groups = groups_of(config)  # refuses what does not fit before all else
+    groups = groups_of(config)  # refuses invalid configs first
     strategies = tuple(item.name for item in strategies_of(config))
     goal = goal_of(args, strategies)
     check_mission(config.mission)
@@ -65,7 +65,7 @@ def main(args: CompareArgs) -> int:
 
 
 def goal_of(args: CompareArgs, strategies: tuple[str, ...]) -> Goal | None:
-    """What is watched; InputError where the difference is none of this study's."""
+    """The difference to watch; `InputError` if this study does not have it."""
     chosen = {"first": args.first, "second": args.second}
     if args.until_width is None:
         for name in chosen:
@@ -76,7 +76,7 @@ def goal_of(args: CompareArgs, strategies: tuple[str, ...]) -> Goal | None:
     for name, other in (("first", "second"), ("second", "first")):
         strategy = chosen[name]
         if (strategy and strategy not in strategies) or usual is None:
-            message = f"must be one of the strategies, which are {', '.join(strategies)}, and needs another"
+            message = f"must be one of the strategies ({', '.join(strategies)}), and the study must have at least two"
             raise InputError(message, field=name, value=strategy)
         if strategy and strategy == chosen[other]:
             raise InputError("must differ from the other side", field=name, value=strategy)
@@ -84,6 +84,6 @@ def goal_of(args: CompareArgs, strategies: tuple[str, ...]) -> Goal | None:
     first, second = (chosen[name] or rest.pop(0) for name in ("first", "second"))
     if args.measure == "success" and args.until_width >= 2:
         raise InputError(
-            "must be below 2 for success: wider no interval is", field="until-width", value=args.until_width
+            "must be below 2 for success: no interval is wider", field="until-width", value=args.until_width
         )
     return Goal(args.measure, first, second, args.until_width)

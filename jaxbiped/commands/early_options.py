@@ -1,4 +1,4 @@
-"""Options that decide the defaults of others: read from the command line before the rest of it is parsed."""
+"""Options that decide the defaults of others, read from the command line before the rest of it is parsed."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ NUMBERS = {int: re.compile(r"\d{1,9}"), float: re.compile(r"\d{0,9}\.?\d{1,9}")}
 def with_early(
     data: dict[str, Any], rest: Sequence[str], options: type[Model], path: Path | None = None
 ) -> dict[str, Any]:
-    """`data` of a TOML file with those options in it that decide the defaults of others.
+    """`data` of a TOML file, updated with the options that decide the defaults of others.
 
-    They must be known before the others are read: the camera's size and rays, too, for the rays of a `--preset` need
-    only go with the size that it is given. What cannot be right is left for the parser to refuse.
+    They must be known before the others are read. That includes the camera's size and rays, since the rays of a
+    `--preset` only need to match the given size. Values that cannot be right are left for the parser to reject.
 
     Args:
       rest: the words of the command line.
-      path: of the file.
+      path: path of the file.
 
     Raises:
-      InputError: a key of the file that is an option of the command line alone.
+      InputError: a key of the file that exists only as an option of the command line.
     """
     for name in FILE_OPTIONS:
         if name in data and name in options.model_fields:
@@ -40,7 +40,7 @@ def with_early(
     found: dict[str, Any] = {}
     parts = options.model_fields["mission"].annotation.model_fields if whole else options.model_fields
     for part, value in files(rest, options):
-        if part in parts:  # else the command opens it
+        if part in parts:  # otherwise the command opens it
             found[part] = {FILE: value}
     if whole:
         for option, value in deciding(rest, options.model_fields["mission"].annotation):
@@ -53,7 +53,7 @@ def with_early(
 
 
 def joined(given: Any, found: Any) -> Any:
-    """What the file says of a part with what the command line says of it; a path in its place is that of its file."""
+    """A part of the file updated from the command line; a path given instead of a part stands for that file."""
     if not isinstance(found, dict):
         return found
     if isinstance(given, str):
@@ -62,7 +62,7 @@ def joined(given: Any, found: Any) -> Any:
 
 
 def files(rest: Sequence[str], options: type[Model]) -> Iterator[tuple[str, str]]:
-    """The parts of the config that the command line names a file of, and the file."""
+    """Parts of the config for which the command line names a file, with that file."""
     for name, part in FILE_OPTIONS.items():
         word = last_value(part, rest) if name in options.model_fields else None
         if word and not word.startswith("-"):
@@ -70,7 +70,7 @@ def files(rest: Sequence[str], options: type[Model]) -> Iterator[tuple[str, str]
 
 
 def deciding(rest: Sequence[str], mission: type[Model]) -> Iterator[tuple[str, Any]]:
-    """The options of a mission on which others depend, with values that can be right."""
+    """Mission options on which others depend, with values that may be valid."""
     from jaxbiped.mission.defaults import DECIDING
 
     for option in (*DECIDING, *RAYS):
@@ -87,14 +87,14 @@ def deciding(rest: Sequence[str], mission: type[Model]) -> Iterator[tuple[str, A
 
 
 def last_value(option: str, rest: Sequence[str]) -> str | None:
-    """What the words of a command line say that an option is, the last time that they do; None where they do not."""
+    """The last value that the command line gives an option; None if it gives none."""
     words = [value_of(option, word, following) for word, following in itertools.pairwise([*rest, ""])]
     words = [word for word in words if word]
     return words[-1] if words else None
 
 
 def value_of(option: str, word: str, following: str) -> str | None:
-    """What a word of the command line, with the one that follows it, says that the option is; None for other words."""
+    """The value that a word of the command line (and the next word) gives the option; None for other words."""
     name, equals, value = word.partition("=")
     if name.replace("_", "-") != f"--{option.replace('_', '-')}":
         return None

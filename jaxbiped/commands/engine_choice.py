@@ -1,4 +1,4 @@
-"""Where the shards of a study are computed: options that commands share."""
+"""Where the shards of a study are computed: options shared by several commands."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ def engine(args: EngineArgs, console: Console, shards: int, ordered: bool = Fals
     """Arguments of `conduct` that say where shards are computed.
 
     Args:
-      shards: of the study.
-      ordered: whether they are wanted in the order of their numbers.
+      shards: number of shards of the study.
+      ordered: whether shards must be returned in order.
 
     Raises:
-      InputError: no such scheduler, or workers that cannot be used.
+      InputError: the scheduler does not exist, or its workers cannot be used.
     """
     if args.scheduler is None and args.workers is None:
         yield {}
         return
     if args.scheduler is not None and args.workers is not None:
-        raise InputError("goes with no --scheduler, which has its own workers", field="workers", value=args.workers)
+        raise InputError("does not go with --scheduler, which has its own workers", field="workers", value=args.workers)
     try:
         from jaxbiped.study.cluster import Cluster, connect, local_cluster
     except ModuleNotFoundError as error:
@@ -38,5 +38,5 @@ def engine(args: EngineArgs, console: Console, shards: int, ordered: bool = Fals
         count = cluster.workers()
         console.print(f"{count} workers at {cluster.address}, {shards} shards", highlight=False)
         if shards < count:
-            console.print("fewer shards than workers: a smaller --shard would give all of them work", highlight=False)
+            console.print("fewer shards than workers: a smaller --shard would keep all of them busy", highlight=False)
         yield {"engine": cluster, "device": cluster.device, "compile_time": lambda: cluster.seconds}

@@ -1,4 +1,4 @@
-"""`jaxbiped fit-sensor`: the noise of the ray-cast sensor, fitted to rendered pairs of a camera."""
+"""`jaxbiped fit-sensor`: fit the noise of the ray-cast sensor to rendered pairs of a camera."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def main(args: FitSensorArgs) -> int:
       Exit status 0.
 
     Raises:
-      InputError: a bad camera file, nothing can be rendered here, or the file exists or cannot be written.
+      InputError: a bad camera file, no way to render here, or an output file that exists or cannot be written.
     """
     camera = config.load(CameraConfig, args.camera) if args.camera else CameraConfig()
     out = args.out or Path("results") / f"fit-sensor-{config_hash(args.model_copy(update={'out': None}))}.toml"
@@ -51,34 +51,34 @@ def main(args: FitSensorArgs) -> int:
 
 
 def store(out: Path, found: Fit, args: FitSensorArgs, said: list[str]) -> None:
-    """Write the sensor file, with what is said of it; once without the comparison, which takes as long as the fit."""
+    """Write the sensor file and its comments; first without the comparison, which takes as long as the fit."""
     heading = [f"Written by `jaxbiped fit-sensor --arenas {args.arenas} --views {args.views} --seed {args.seed}`.",
-               *said, "Fitted: what pictures tell. The rest is the base's: the attitude's error, say."]  # fmt: skip
+               *said, "Fitted: what pictures can tell. The rest, say the attitude error, is the base's."]  # fmt: skip
     text = sensor_toml(found, heading)
     write_whole(out, lambda file: file.write(text.encode()), parents=True)
 
 
 def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
-    """What was measured, for people."""
+    """The measurements, as text."""
     q, stereo, marks, cast = found.quality, found.sensor.stereo, found.sensor.landmarks, found.sensor.rays
     seen = [sight for sight in found.sights if sight.error is not None]
     discs = sum(sight.kind == CIRCLE for sight in seen)
     off = np.median([np.hypot(*sight.error) for sight in seen]) if seen else np.nan
     return [
         f"matcher    {args.arenas} arenas, {found.views} views: bias {q.bias:+.3f} px, sd {q.sd:.3f} px; "
-        f"{q.measured:.1%} measured of what both cameras see, {q.wrong:.1%} of that beyond 1 px",
-        f"nothing    {q.phantoms:.1%} of what one camera sees comes out as something wild; {found.plain:.1%} of plain "
-        f"surfaces do; half is measured at a contrast of {stereo.min_contrast:.2f}",
-        f"landmarks  {len(seen)} found ({discs} discs) of {len(found.sights)} in view, {1e3 * off:.1f} mm off in the "
-        f"median; sd {1e3 * marks.sd:.1f} mm + {1e3 * marks.sd_per_metre:.1f} mm/m; discs to "
+        f"{q.measured:.1%} of what both cameras see is measured, {q.wrong:.1%} of that with an error above 1 px",
+        f"nothing    {q.phantoms:.1%} of what only one camera sees is matched at random; {found.plain:.1%} of plain "
+        f"surfaces are; half is measured at a contrast of {stereo.min_contrast:.2f}",
+        f"landmarks  {len(seen)} found ({discs} discs) of {len(found.sights)} in view, median error {1e3 * off:.1f} "
+        f"mm; sd {1e3 * marks.sd:.1f} mm + {1e3 * marks.sd_per_metre:.1f} mm/m; discs to "
         f"{marks.furthest_circle:.2f} m, squares to {marks.furthest_square:.2f} m",
-        f"rays       {cast.columns} x {cast.rows}: {found.same:.1%} of these arenas' cells are those of stereo "
+        f"rays       {cast.columns} x {cast.rows}: {found.same:.1%} of these arenas' cells agree with stereo "
         f"(wanted: {ALIKE:.1%})",
     ]
 
 
 def compared(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, found: Fit, missions: int) -> list[str]:
-    """How close both sensors come on arenas that were not fitted to, with the fitted noise and as it was."""
+    """Agreement of the two sensors on arenas that were not used for the fit, with the fitted and the original noise."""
     rendered = rendered.model_copy(update={"stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})
     fitted = with_rays(rendered, found.sensor.rays)
     before = fitted.model_copy(update={"stereo": NoiseConfig()})
@@ -92,7 +92,7 @@ def compared(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, fou
             maps[name].append(fused(place, looking(how, sees), how)[0])
     stereo = np.stack(maps["stereo"])
     count = len(places) * len(places[0].poses)
-    said = [f"maps       {len(places)} other arenas, {count} views; cells that are those of stereo:"]
+    said = [f"maps       {len(places)} other arenas, {count} views; cells that agree with stereo:"]
     for name in list(each)[1:]:
         how = each[name][0].camera
         share, measured = agreement(stereo, np.stack(maps[name]))
@@ -102,7 +102,7 @@ def compared(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, fou
     for name in ("stereo", "fitted"):
         rated = score(maps[name], [place.classes for place in places])
         kinds = ", ".join(f"{kind} {rated.recall[kind]:.3f} / {rated.precision[kind]:.3f}" for kind in rated.recall)
-        said.append(f"{name:<10} right {rated.right:.3f}; recall / precision within one cell: {kinds}")
+        said.append(f"{name:<10} accuracy {rated.right:.3f}; recall / precision within one cell: {kinds}")
     if missions:
         pairs = [(mission(place, rendered, eyes), mission(place, fitted, None)) for place in
                  track(places[:missions], description="missions", console=show, transient=True)]  # fmt: skip

@@ -26,8 +26,8 @@ from jaxbiped.terminal import legible
 if TYPE_CHECKING:
     from jaxbiped.commands.classify import ClassifyArgs
 
-LEVELS = 32  # as many as a mask of levels has bits
-LOWEST = 0.01  # share of heights that may lie below the base floor, as errors do
+LEVELS = 32  # the number of bits in a mask of levels
+LOWEST = 0.01  # share of heights that may lie below the base floor, as errors
 
 
 def main(args: ClassifyArgs, out: Path) -> int:
@@ -37,7 +37,7 @@ def main(args: ClassifyArgs, out: Path) -> int:
       Exit status 0.
 
     Raises:
-      InputError: a map that cannot be used, options that do not go with one or with each other, a folder that exists or
+      InputError: an unusable map, options that do not go with a map or with each other, a folder that exists or
         cannot be written.
     """
     check_options(args)
@@ -78,14 +78,14 @@ def main(args: ClassifyArgs, out: Path) -> int:
     above = (MOST_GROUNDS - 0.5) * args.robot.step
     walls = float(np.mean(elevation.heights > floor + above))  # NaN compares false
     if walls:
-        print(f"walls     {walls:.1%} of the heights lie over {above:.3g} m above the floor, and count as walls")
+        print(f"walls     {walls:.1%} of the heights lie more than {above:.3g} m above the floor, and count as walls")
     print(f"map       {say_cells(grid)}, in {seconds:.1f} s")
     print(f"written   {out}: classes.npz, elevation.npz, elevation.png, map.png, classify.json")
     return 0
 
 
 def check_options(args: ClassifyArgs) -> None:
-    """Raise `InputError` about options that only clouds have."""
+    """Raise `InputError` about options that apply to clouds only."""
     for name in ("up", "tilt", "map"):
         value = getattr(args, name)
         if value != type(args).model_fields[name].default:
@@ -94,9 +94,9 @@ def check_options(args: ClassifyArgs) -> None:
 
 
 def base_height(elevation: Elevation, robot: RobotConfig) -> float:
-    """Height [m] of the base floor: the commonest one, to what the robot bears, within half a step of the lowest.
+    """Height [m] of the base floor: the most common height, to the robot's tolerance, within half a step of the lowest.
 
-    The lowest percent are left out: they are errors, or a floor that hardly anything stands on.
+    The lowest percent is left out: such heights are errors, or a floor that hardly anything stands on.
     """
     known = np.sort(elevation.heights[np.isfinite(elevation.heights)])
     low = known[int(LOWEST * len(known))]
@@ -118,7 +118,7 @@ def classify(
 
     Args:
       pitch: [m] side of a cell.
-      area: (least x, greatest x, least y, greatest y) [m] in place of all that the heights cover.
+      area: (least x, greatest x, least y, greatest y) [m] instead of all that the heights cover.
 
     Raises:
       InputError: an empty area, or too many cells.
@@ -144,7 +144,7 @@ def classify(
 def lay_out(
     elevation: Elevation, pitch: float, area: tuple[float, float, float, float] | None
 ) -> tuple[tuple[int, int], Float64[np.ndarray, "2"]]:
-    """Rows and columns of a grid, and the place [m] of its corner."""
+    """Rows and columns of a grid, and the position [m] of its corner."""
     if area is None:
         low = elevation.origin_xy.astype(float)
         cells = np.ceil(np.array(elevation.size_xy) / pitch - 1e-6)
@@ -155,7 +155,7 @@ def lay_out(
         cells = np.ceil((high - low) / pitch - 1e-6)
     if not cells.prod() <= MOST_CELLS:
         wide, deep = cells * pitch
-        message = f"must give at most {MOST_CELLS:,} cells on {wide:.6g} x {deep:.6g} m; a larger --pitch does"
+        message = f"must give at most {MOST_CELLS:,} cells on {wide:.6g} x {deep:.6g} m; choose a larger --pitch"
         raise InputError(message, field="pitch", value=pitch)
     columns, rows = (max(int(n), 1) for n in cells)
     return (rows, columns), low

@@ -1,4 +1,4 @@
-"""A map of any of the three formats, and how its positions are written."""
+"""A map in any of the three formats, and how positions on it are written."""
 
 from __future__ import annotations
 
@@ -31,27 +31,27 @@ LARGEST_IN_CENTIMETRES = 5.0  # [m] a map beyond this is drawn in metres
 
 @dataclass(frozen=True)
 class MapSource:
-    """A map and where it is from."""
+    """A map and where it comes from."""
 
     file: Path
     kind: str  # one of the values of SUFFIXES
     grid: ClassGrid  # obstacles grown
-    radius: float  # [m] by which they are
+    radius: float  # [m] by which obstacles are grown
 
     @property
     def in_cells(self) -> bool:
-        """Whether positions are column and row, from the upper left, rather than metres."""
+        """Whether positions are column and row from the upper left, rather than metres."""
         return self.kind == "Moving AI map"
 
     @property
     def axis(self) -> Axis:
-        """How the map is drawn."""
+        """The axis on which the map is drawn."""
         if self.in_cells:
             return Axis("cells", 1 / self.grid.pitch, y_down=True)
         return CENTIMETRES if max(self.grid.shape) * self.grid.pitch <= LARGEST_IN_CENTIMETRES else METRES
 
     def free_cell(self, position: tuple[float, float], field: str) -> tuple[int, int]:
-        """Row and column of a position that a person gave; raise `InputError` outside the map and in an obstacle."""
+        """Row and column of a given position; raise `InputError` outside the map and in an obstacle."""
         if self.in_cells:
             rows, columns = self.grid.shape
             x, y = position
@@ -62,12 +62,12 @@ class MapSource:
         else:
             cell = self.grid.cell_at(position, field, self.file)
         if self.grid.classes[cell] == Cell.OBSTACLE:
-            near = f" or nearer than the radius of {self.radius:g} m to one" if self.radius else ""
+            near = f" or closer to one than the radius of {self.radius:g} m" if self.radius else ""
             raise InputError(f"must not be inside an obstacle{near}", file=self.file, field=field, value=position)
         return cell
 
     def say(self, cell: tuple[int, int]) -> str:
-        """A cell as a person would give it."""
+        """A cell as a user would write it."""
         i, j = cell
         if self.in_cells:
             return f"({j}, {i})"
@@ -76,7 +76,7 @@ class MapSource:
 
 
 def open_map(file: Path, pitch: float, radius: float) -> MapSource:
-    """Read a map by its suffix, or by its first bytes where the suffix is another.
+    """Read a map by its suffix, or by its first bytes if the suffix is unknown.
 
     Args:
       file: the map.
@@ -84,7 +84,7 @@ def open_map(file: Path, pitch: float, radius: float) -> MapSource:
       radius: [m] by which obstacles grow.
 
     Raises:
-      InputError: no such file, no map, or a damaged one.
+      InputError: the file does not exist, is not a map, or is damaged.
     """
     kind = SUFFIXES.get(file.suffix.lower()) or kind_by_content(file)
     if kind == "Moving AI map":
@@ -97,7 +97,7 @@ def open_map(file: Path, pitch: float, radius: float) -> MapSource:
 
 
 def kind_by_content(file: Path) -> str:
-    """What the first bytes of a file say that it is."""
+    """The kind of map according to the first bytes of a file."""
     try:
         with open(file, "rb") as stream:
             head = stream.read(16).removeprefix(codecs.BOM_UTF8)

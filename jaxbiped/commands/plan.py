@@ -1,4 +1,4 @@
-"""`jaxbiped plan`: a path on a map that somebody already has."""
+"""`jaxbiped plan`: a path on an existing map."""
 
 from __future__ import annotations
 
@@ -25,26 +25,26 @@ from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, next_
 from jaxbiped.terminal import legible
 
 NO_PATH = 1  # exit status
-MOVES_AT_ONCE = 256  # read off a field by one compiled call
+MOVES_AT_ONCE = 256  # read from a field in one compiled call
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A path on a map, and what it took."""
+    """A path on a map, and its cost."""
 
     cells_ij: Int[np.ndarray, "n 2"]  # from start to goal
-    costs: Float[np.ndarray, "n"]  # spent on the way to each cell
+    costs: Float[np.ndarray, "n"]  # accumulated up to each cell
     length: float  # [cells] 1 straight, sqrt(2) diagonal
     turns: int  # changes of direction
     seconds: float  # [s] the field and the path, compiled
-    compile_seconds: float  # [s] the first time, on top
+    compile_seconds: float  # [s] extra time of the first call
 
 
 def main(args: PlanArgs) -> int:
     """Run the command: plan and write a folder, or check a scenario.
 
     Returns:
-      Exit status: 0, or 1 when there is no path or a query's length differs.
+      Exit status: 0, or 1 if there is no path or the length of a query differs.
 
     Raises:
       InputError: options that do not go together, a bad map, start or goal outside the map or in an obstacle, a folder
@@ -77,7 +77,7 @@ def radius_of(args: PlanArgs) -> float:
         return args.radius
     robot = load(RobotConfig, args.robot)
     if args.radius:
-        raise InputError("goes without a --robot, whose radius is taken", field="radius", value=args.radius)
+        raise InputError("does not go with --robot, whose radius is used", field="radius", value=args.radius)
     return robot.radius
 
 
@@ -86,9 +86,9 @@ def check_options(args: PlanArgs) -> None:
     if args.scenario is None:
         for name in ("start", "goal"):
             if getattr(args, name) is None:
-                raise InputError("must be given as X Y, unless a --scenario is", field=name)
+                raise InputError("must be given as X Y, unless --scenario is given", field=name)
         if args.sample is not None:
-            raise InputError("goes with a --scenario only", field="sample", value=args.sample)
+            raise InputError("goes with --scenario only", field="sample", value=args.sample)
         return
     for name in ("start", "goal", "c0", "c1", "c2", "c3", "c4", "corner_cutting", "radius", "robot"):
         if getattr(args, name) != PlanArgs.model_fields[name].default:
@@ -97,7 +97,7 @@ def check_options(args: PlanArgs) -> None:
 
 
 def solve(classes, levels, costs, rules, goal_ij):
-    """Edge costs and cost-to-go of one map; not in one program, in which the planner is slower on large maps."""
+    """Edge costs and cost-to-go of one map; not in one program, which makes the planner slower on large maps."""
     edges = jax.jit(edge_costs)(classes[None], levels[None], costs, rules)
     return edges[0], field(classes[None], levels[None], costs, rules, goal_ij).cost
 
@@ -108,10 +108,10 @@ steps = jax.jit(next_step, static_argnames="length")
 def find(
     source: MapSource, start_ij: tuple[int, int], goal_ij: tuple[int, int], costs: Costs, rules: Rules
 ) -> Plan | None:
-    """The best path between two free cells, or None when there is none.
+    """The best path between two free cells, or None if there is none.
 
     Raises:
-      InputError: costs so far apart that float32 cannot tell the cells of the way from each other.
+      InputError: costs so different in size that float32 cannot distinguish the cells of the path.
     """
     grid = source.grid
     start, goal = np.array([start_ij], np.int32), np.array([goal_ij], np.int32)
@@ -121,7 +121,7 @@ def find(
     directions, first_read, seconds_read = timed(lambda: read(grid, to_go, costs, rules, start))
     cells = np.concatenate([start, start + np.cumsum(DIRECTIONS[directions], axis=0)])
     if tuple(cells[-1].tolist()) != goal_ij:
-        message = "must not exceed the other costs so much: single precision loses the way on this map"
+        message = "must not exceed the other costs by so much: single precision cannot resolve the path on this map"
         raise InputError(message, field="c4", value=float(costs.c4))
     prices = np.asarray(edges, np.float64)[directions, *cells[:-1].T]
     lengths = np.hypot(*DIRECTIONS[directions].T.astype(float))
@@ -136,7 +136,7 @@ def find(
 
 
 def read(grid: ClassGrid, to_go, costs: Costs, rules: Rules, start_ij: Int[np.ndarray, "1 2"]) -> Int[np.ndarray, "n"]:
-    """Directions of all moves of the path, a slice at a time, so that its length needs not be known."""
+    """Directions of all moves of the path, read in slices, so that its length need not be known."""
     moves, ij, heading = np.zeros(0, np.int64), start_ij, np.array([-1], np.int32)
     while True:
         more = np.asarray(
@@ -150,7 +150,7 @@ def read(grid: ClassGrid, to_go, costs: Costs, rules: Rules, start_ij: Int[np.nd
 
 
 def timed(call):
-    """(result, seconds of the first call, seconds of the second, compiled one)."""
+    """(result, seconds of the first call, seconds of the second, which is compiled)."""
     seconds = []
     for _ in range(2):
         start = time.perf_counter()
@@ -160,7 +160,7 @@ def timed(call):
 
 
 def report(source: MapSource, plan: Plan, args: PlanArgs) -> None:
-    """Print what was found."""
+    """Print the result."""
     grid, moves = source.grid, len(plan.cells_ij) - 1
     count = {cell.name.lower(): int((grid.classes == cell).sum()) for cell in Cell}
     cells = ", ".join(f"{number} {name}" for name, number in count.items() if number)

@@ -48,8 +48,8 @@ LIMITS = {  # disturbances one at a time: unit, and the values tried
 }
 OF_EDGES, OF_GATES = ("rise", "edge", "yaw"), ("yaw", "lateral", "clearance")
 SERVO = (0.5, 1.0, 2.0)  # [deg] standard deviations of servo offsets
-RIM_EDGE = np.arange(0.0, 0.0901, 0.0025)  # [m] from where the robot starts
-APART, HARD_CASES = 1e-3, 64  # [m] that backends may be apart; trials whose outcomes must be the same
+RIM_EDGE = np.arange(0.0, 0.0901, 0.0025)  # [m] distance from the start
+APART, HARD_CASES = 1e-3, 64  # [m] largest difference of backends; trials whose outcomes must be the same
 DIFFERENT = 1  # exit status
 WINDOW_EDGE, WINDOW_YAW = np.linspace(-0.035, 0.035, 15), np.linspace(-20, 20, 11)  # [m], [deg]
 
@@ -58,10 +58,10 @@ def main(args: PrimitivesArgs) -> int:
     """Run the command.
 
     Returns:
-      Exit status 0; with `against`, 1 when the backends do not agree.
+      Exit status 0; with `against`, 1 if the backends disagree.
 
     Raises:
-      InputError: a robot that cannot play a primitive (which joint or leg, and when), a device that is not there, a
+      InputError: a robot that cannot play a primitive (which joint or leg, and when), a missing device, a
         folder that exists or cannot be written.
     """
     out = args.out or Path("results") / "primitives"
@@ -115,7 +115,7 @@ def main(args: PrimitivesArgs) -> int:
 
 
 def refuse_what_cannot_be(asked: Mapping[str, Request], robot: RobotModelConfig, args: PrimitivesArgs) -> None:
-    """Raise `InputError` about a bump or a gate that the robot is not made for."""
+    """Raise `InputError` about a bump or a gate that the robot cannot pass."""
     highest = RobotConfig().step
     if any(request.rise for request in asked.values()) and args.bump > highest:
         raise InputError(f"must be at most the robot's step height, {highest:g} m", field="--bump", value=args.bump)
@@ -125,7 +125,7 @@ def refuse_what_cannot_be(asked: Mapping[str, Request], robot: RobotModelConfig,
 
 
 def agree(tables: Mapping[str, PrimitiveTable], robot: RobotModelConfig, args: PrimitivesArgs, console: Console) -> int:
-    """Print how far another backend is from `native`; the exit status."""
+    """Print how much another backend differs from `native`, and return the exit status."""
     good = True
     for name, table in tables.items():
         furthest, when = paths(table, robot, args.against, device=args.device).worst
@@ -146,7 +146,7 @@ def agree(tables: Mapping[str, PrimitiveTable], robot: RobotModelConfig, args: P
 
 
 def write(path: Path, data: bytes) -> None:
-    """A whole file or none."""
+    """Write a file, whole or not at all."""
     write_whole(path, lambda file: file.write(data))
 
 
@@ -164,14 +164,14 @@ def verify(name: str, table: PrimitiveTable, robot: RobotModelConfig, args: Prim
 
 
 def recorded(args: PrimitivesArgs) -> Iterator[tuple[str, Disturbance]]:
-    """What is measured wholly: undisturbed, and the sets."""
+    """The sets of trials that are measured in full: undisturbed, and the sets of disturbances."""
     yield "nominal", Disturbance()
     for name, chosen in SETS.items():
         yield from ((name, disturbance) for disturbance in chosen.draws(args.draws, args.seed))
 
 
 def probes(name: str, table: PrimitiveTable, args: PrimitivesArgs) -> Iterator[tuple[str, Disturbance]]:
-    """Disturbances one at a time; edges of a step at all distances and yaws, and edges that are not expected."""
+    """Disturbances one at a time: edges of a step at all distances and yaws, and unexpected edges."""
     request = table.request
     for factor, (unit, values) in LIMITS.items():
         applies = request.rise if factor in OF_EDGES and factor not in OF_GATES else True
@@ -191,7 +191,7 @@ def probes(name: str, table: PrimitiveTable, args: PrimitivesArgs) -> Iterator[t
 
 
 def rows_of(name: str, sets, disturbances, result) -> pl.DataFrame:
-    """Trials as a table: what was disturbed, and what came of it."""
+    """Trials as a table: the disturbance and the outcome of each."""
     tolerance = Tolerance()
     columns = {"primitive": [name] * len(sets), "set": list(sets)}
     columns |= {

@@ -1,4 +1,4 @@
-"""How far a study is, on a terminal."""
+"""Progress of a study, on a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from jaxbiped.study.evaluation import Progress as Done
 
 @contextmanager
 def progress(console: Console) -> Iterator[Callable[[Done], None]]:
-    """A bar on a terminal, with missions done, their rate, how many failed, and the time left; nothing elsewhere."""
+    """A bar on a terminal, with missions done, their rate, how many failed, and the time left; elsewhere nothing."""
     columns = (
         TextColumn("missions"),
         BarColumn(),

@@ -1,4 +1,4 @@
-"""`jaxbiped report`: the tables and figures of a results folder, written anew from its rows."""
+"""`jaxbiped report`: rewrite the tables and figures of a results folder from its rows."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from jaxbiped.report.folder_report import terminal_report, write_report
 
 
 def main(args: ReportArgs) -> int:
-    """Run the command; exit status 0. InputError: no results there, or damaged ones."""
+    """Run the command and return exit status 0. InputError: results that are missing or damaged."""
     report = write_report(args.folder, point=args.point, examples=args.examples)
     console = Console()
     console.print(terminal_report(report))

@@ -1,4 +1,4 @@
-"""`jaxbiped reproduce`: the paper's experiments again, our figures beside the paper's, on one page."""
+"""`jaxbiped reproduce`: repeat the paper's experiments and put both sets of figures on one page."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ def main(args: ReproduceArgs) -> int:
     """Run the command.
 
     Returns:
-      Exit status 0, however the missions end: the page says it.
+      Exit status 0, however the missions end: the page reports that.
 
     Raises:
-      InputError: no scenes, nothing to render with, a biped that cannot be simulated, a folder that exists or cannot
+      InputError: no scenes, no renderer, a biped that cannot be simulated, a folder that exists or cannot
         be written.
     """
     own = own_parts(args)
@@ -69,7 +69,7 @@ def main(args: ReproduceArgs) -> int:
 
 
 def own_parts(args: ReproduceArgs) -> dict[str, str]:
-    """What the missions of the scenes have of the user's own, in place of the paper's robot, camera and preset."""
+    """The user's own robot, camera and preset of the missions in the scenes, where they are not the paper's."""
     given = {"robot": args.robot_file, "camera": args.camera_file}
     files = {part: str(path) for part, path in given.items() if path is not None}
     preset = type(args).model_fields["preset"].default
@@ -77,7 +77,7 @@ def own_parts(args: ReproduceArgs) -> dict[str, str]:
 
 
 def gather(args: ReproduceArgs, arenas: dict[str, Arena], config: MissionConfig, console: Console) -> Findings:
-    """Play everything."""
+    """Play all missions."""
     seeds = range(args.seed, args.seed + args.repeats)
     of_table_1, of_mishaps, of_repeat = MISSIONS
     played = {}
@@ -113,7 +113,7 @@ def gather(args: ReproduceArgs, arenas: dict[str, Arena], config: MissionConfig,
 
 
 def crossings(args: ReproduceArgs, console: Console) -> Iterator[tuple[StudyConfig, pl.DataFrame, pl.DataFrame | None]]:
-    """The rows of both populations; of the larger one also those of a robot that always crosses."""
+    """The rows of both populations; for the larger one also those of a robot that always crosses."""
     if args.population:
         config = study(args.population, args.seed, "sampled")
         yield config, rows(config, "random bumps, sampled", console), rows(always(config), "always crossed", console)
@@ -130,10 +130,10 @@ def rows(config: StudyConfig, name: str, console: Console) -> pl.DataFrame:
 
 @contextmanager
 def stage(console: Console, name: str, total: int) -> Iterator[Callable[..., None]]:
-    """A part of the command: a bar on a terminal, and how long it took.
+    """A part of the command: show a bar on a terminal, and print how long it took.
 
     Yields:
-      To be called after each mission, or with the number of those that have ended.
+      A function to call after each mission, or with the number of missions that have ended.
     """
     began = time.perf_counter()
     columns = TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn()

@@ -27,7 +27,7 @@ def main(args: RunArgs) -> int:
     """Run the command.
 
     Returns:
-      Exit status: 0 when the goal was reached, else 1.
+      Exit status: 0 if the goal was reached, else 1.
 
     Raises:
       InputError: a bad scene, a pitch that does not divide its area, a biped that cannot be simulated, a folder that
@@ -69,7 +69,7 @@ def main(args: RunArgs) -> int:
 
 
 def sentence(mission: Mission) -> str:
-    """How it went, for people."""
+    """The outcome, as text."""
     minutes = mission.time / 60
     return (
         f"{mission.code.label.replace('_', ' ')}: {100 * mission.distance:.0f} cm in {mission.time:.0f} s "

@@ -1,4 +1,4 @@
-"""Every query of a Moving AI scenario against the file's optimal length."""
+"""Check every query of a Moving AI scenario against the file's optimal length."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import Costs, Rules, field
 
 OCTILE = Costs(1.0, 0.0, 0.0, 0.0, 0.0)  # a straight move 1, a diagonal one sqrt(2), and nothing else
-CELLS_AT_ONCE = 1 << 21  # of all maps of a chunk; 16 double-width planes of it are 270 MB
-ROUNDING = 1e-6  # of a length, by float32: below 0.005 cells up to 5,000, the least by which octile lengths of
-# one query differ in practice (99 straight moves for 70 diagonal ones)
+CELLS_AT_ONCE = 1 << 21  # in all maps of a chunk; 16 double-precision planes of it take 270 MB
+ROUNDING = 1e-6  # relative error of a length in float32: below 0.005 cells up to 5,000, the least by which octile
+# lengths of one query differ in practice (99 straight moves for 70 diagonal ones)
 LISTED = 10  # queries that differ, printed one by one
 DIFFER = 1  # exit status
 
@@ -41,14 +41,14 @@ def costs_to(classes, levels, goals_ij):
 def lengths(
     grid: ClassGrid, start_ij: Int[np.ndarray, "Q 2"], goal_ij: Int[np.ndarray, "Q 2"], show: bool = False
 ) -> Float64[np.ndarray, "Q"]:
-    """Octile length [cells] of each query, inf where there is no path: one field a distinct goal, in chunks.
+    """Octile length [cells] of each query, inf where there is no path: one field per distinct goal, in chunks.
 
     Args:
       grid: the map.
       start_ij, goal_ij: cells.
       show: draw a progress bar.
 
-    Right to `ROUNDING` of a length.
+    Lengths are exact up to a relative error of `ROUNDING`.
     """
     found = np.full(len(goal_ij), np.inf)
     goals, of_query = np.unique(goal_ij, axis=0, return_inverse=True)
@@ -56,7 +56,7 @@ def lengths(
     size = int(np.clip(CELLS_AT_ONCE // grid.classes.size, 1, min(64, len(goals))))
     firsts = range(0, len(goals), size)
     for first in track(firsts, description="queries", transient=True, disable=not show, console=Console(stderr=True)):
-        chunk = goals[np.minimum(np.arange(first, first + size), len(goals) - 1)]  # the last one filled up: one shape
+        chunk = goals[np.minimum(np.arange(first, first + size), len(goals) - 1)]  # the last chunk is padded: one shape
         cost = np.asarray(costs_to(grid.classes, grid.levels, chunk.astype(np.int32)))
         mine = np.flatnonzero((of_query >= first) & (of_query < first + size))
         i, j = start_ij[mine].T
@@ -74,10 +74,10 @@ def check_scenario(source: MapSource, path: Path, sample: int | None, out: Path)
       out: a folder that does not exist.
 
     Returns:
-      Exit status: 0 when all agree, 1 when any differs.
+      Exit status: 0 if all agree, 1 if any differs.
 
     Raises:
-      InputError: the map is no Moving AI map, a bad scenario, or `out` cannot be written.
+      InputError: the map is not a Moving AI map, a bad scenario, or `out` cannot be written.
     """
     if not source.in_cells:
         raise InputError("goes with a Moving AI .map only", file=source.file, field="scenario", value=str(path))
@@ -101,12 +101,12 @@ def check_scenario(source: MapSource, path: Path, sample: int | None, out: Path)
     with new_folder(out) as folder:
         write_whole(folder / "queries.csv", lambda file: file.write(text.getvalue().encode()))
     print(f"map       {source.file}: {source.grid.shape[1]} x {source.grid.shape[0]} cells")
-    print(f"scenario  {path}: {len(picked)} of {count} queries, in {seconds:.1f} s with compilation")
+    print(f"scenario  {path}: {len(picked)} of {count} queries, in {seconds:.1f} s including compilation")
     print(f"equal     {int(equal.sum())} of {len(picked)} optimal lengths")
     wrong = [row for row in rows if not row[-1]]
     for bucket, sx, sy, gx, gy, best, got, _ in wrong[:LISTED]:
         off_ground = Cell.OBSTACLE in source.grid.classes[[sy, gy], [sx, gx]]
-        why = ", for an end is water, trees or out of bounds" if off_ground else ""
+        why = "; an end is water, trees or out of bounds" if off_ground else ""
         print(f"differs   bucket {bucket}, ({sx}, {sy}) to ({gx}, {gy}): file {best:.9g}, found {got}{why}")
     if len(wrong) > LISTED:
         print(f"          and {len(wrong) - LISTED} more")

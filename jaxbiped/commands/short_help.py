@@ -1,4 +1,4 @@
-"""What `--help` and `--help-all` print: what most people need of a command's options, and all of them."""
+"""What `--help` and `--help-all` print: the options that most people need, and all of them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from jaxbiped.config import Model, field_docs
 SHORT, ALL = ("-h", "--help"), "--help-all"
 WIDEST = 120  # [columns] of a description
 NAMED = 2  # groups of options that are named below the short help
-LONGEST = 3  # words of a default that is shown there
-WORDS = {Path: "PATH", str: "NAME", int: "INT", float: "FLOAT"}  # for values
+LONGEST = 3  # words of the longest default that is shown there
+WORDS = {Path: "PATH", str: "NAME", int: "INT", float: "FLOAT"}  # placeholders of values
 
 
 def is_asked(rest: Sequence[str]) -> bool:
@@ -31,10 +31,10 @@ def is_asked(rest: Sequence[str]) -> bool:
 
 
 def print_help(options: type[Options], command: str, rest: Sequence[str], known: Model | None = None) -> None:
-    """Print what `rest` asks for, the options that most people need or all of them.
+    """Print the help that `rest` asks for: the options that most people need, or all of them.
 
     Args:
-      known: options that a file gives; what is printed as defaults.
+      known: options that a file gives, printed as defaults.
     """
     everything = ALL in rest
     shown, extra = (options, {"default": known} if known else {}) if everything else (basic(options, known), {})
@@ -48,15 +48,15 @@ def print_help(options: type[Options], command: str, rest: Sequence[str], known:
 
 
 def paragraphs(text: str) -> str:
-    """A docstring, its paragraphs filled anew to the terminal's width; tyro would join lines that are not indented."""
+    """A docstring with its paragraphs wrapped to the terminal's width; tyro would join unindented lines."""
     width = min(shutil.get_terminal_size().columns, WIDEST)
     parts = inspect.cleandoc(text).split("\n\n")
     return "\n".join(textwrap.fill(part, width, initial_indent="  ", subsequent_indent="  ") for part in parts)
 
 
 def basic(options: type[Options], known: Model | None = None) -> type[Model]:
-    """A model with the options that most people need, and the first sentence about each: it is printed, and parses
-    nothing."""
+    """A model with the options that most people need, and the first sentence about each; for printing, not for
+    parsing."""
     fields = {}
     for dotted in options.BASIC or options.model_fields:
         part, _, name = dotted.rpartition(".")
@@ -86,7 +86,7 @@ def hidden_groups(options: type[Options]) -> list[str]:
 
 
 def issubclass_of(kind: Any, base: type) -> bool:
-    """Whether a type, or what stands for one, is a class derived from `base`."""
+    """Whether a type, or its stand-in, is a class derived from `base`."""
     return isinstance(kind, type) and issubclass(kind, base)
 
 
@@ -96,16 +96,16 @@ def first_sentence(text: str) -> str:
 
 
 def as_shown(hint: Any, text: str) -> Any:
-    """How tyro shows an option of a type: by one word for its value, where it has none of its own."""
+    """How tyro shows an option of a type: with one word for its value, unless it has its own."""
     own = any(getattr(item, "metavar", None) for item in getattr(hint, "__metadata__", ()))
     return tyro.conf.arg(metavar=None if own else word_for(hint, text), help_behavior_hint=default_hint)
 
 
 def word_for(kind: Any, text: str) -> str | None:
-    """The word for a value of a type, or of one of the type and None; none where the choices must be shown.
+    """The word for a value of a type, or of a type or None; None if the choices must be shown.
 
     Args:
-      text: about the option; choices that it names need not be shown again.
+      text: the option's help; choices named in it need not be shown again.
     """
     while get_origin(kind) is Annotated:
         kind = get_args(kind)[0]
@@ -121,5 +121,5 @@ def word_for(kind: Any, text: str) -> str | None:
 
 
 def default_hint(label: str) -> str:
-    """What is said of a default, unless it goes without saying or is long."""
+    """How a default is shown, unless it is obvious or long."""
     return "" if label in ("None", "False", "True") or len(label.split()) > LONGEST else f"(default: {label})"

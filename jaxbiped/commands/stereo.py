@@ -24,10 +24,10 @@ from jaxbiped.stereo.points import to_points, useful_range
 from jaxbiped.stereo.rectify import Rig
 from jaxbiped.terminal import legible
 
-UNKNOWN_CONE = math.radians(65.0)  # of a camera that is held upright, pitched by any angle
-KNOWN_CONE = math.radians(5.0)  # that a pose from the camera file may be off
-DOUBTFUL_SHARE, DOUBTFUL_ROLL = 0.2, math.radians(20.0)  # fewer pixels that match, and more roll, are warned of
-HEIGHT_OFF = 0.15  # of the height of the camera file, or 5 cm, that the floor may be off
+UNKNOWN_CONE = math.radians(65.0)  # for a camera held upright, at any pitch
+KNOWN_CONE = math.radians(5.0)  # largest error of a pose from the camera file
+DOUBTFUL_SHARE, DOUBTFUL_ROLL = 0.2, math.radians(20.0)  # warn of fewer matched pixels, or of more roll
+HEIGHT_OFF = 0.15  # relative error of the height in the camera file that is accepted, or 5 cm
 
 
 def main(args: StereoArgs) -> int:
@@ -37,7 +37,7 @@ def main(args: StereoArgs) -> int:
       Exit status 0.
 
     Raises:
-      InputError: pictures or a calibration that cannot be used (none, damaged, blank, of different size, swapped, not
+      InputError: unusable pictures or calibration (missing, damaged, blank, of different size, swapped, not
         rectified), no floor in view and no pose in the camera file, a folder that exists or cannot be written.
     """
     out = args.out or Path("results") / f"stereo-{config_hash(args.model_copy(update={'out': None}))}"
@@ -98,7 +98,7 @@ def main(args: StereoArgs) -> int:
     print(f"matched   {disparity.valid.mean():.1%} of the pixels, in {seconds:.2f} s; {len(points)} points in range")
     print(
         f"{'floor' if floor else 'pose'}     {' ' * (not floor)}"
-        f"{'found' if floor else 'of the camera file, for no floor was found'}: camera {height:.3f} m high, pitched "
+        f"{'found' if floor else 'from the camera file, as no floor was found'}: camera {height:.3f} m high, pitched "
         f"{math.degrees(pitch):.2f} and rolled {math.degrees(roll):.2f} degrees"
         + (f"; {floor.share:.0%} of the surface, within {floor.spread * 1000:.1f} mm" if floor else "")
     )
@@ -108,33 +108,33 @@ def main(args: StereoArgs) -> int:
 
 
 def warn(matched: float, roll: float) -> None:
-    """Say on stderr what makes a map doubtful, a line each: few pixels that match, a floor that leans to the side.
+    """Warn on stderr about what makes a map doubtful, one line each: few matched pixels, a floor that leans sideways.
 
-    A roll that the camera file says is none of them.
+    A roll given in the camera file does not count.
 
     Args:
       matched: share of the pixels.
-      roll: [rad] of the camera over the floor that was found.
+      roll: [rad] of the camera relative to the floor that was found.
     """
     if matched < DOUBTFUL_SHARE:
         print(
-            f"jaxbiped: warning: only {matched:.1%} of the pixels match, below {DOUBTFUL_SHARE:.0%}: the map may be of "
-            "little worth; is the camera file that of this pair, is there texture and light?",
+            f"jaxbiped: warning: only {matched:.1%} of the pixels match, below {DOUBTFUL_SHARE:.0%}: the map may be "
+            "unreliable; check that the camera file belongs to this pair, and that there is texture and light",
             file=sys.stderr,
         )
     if abs(roll) > DOUBTFUL_ROLL:
         print(
             f"jaxbiped: warning: the floor that was found is rolled by {math.degrees(roll):.0f} degrees, above "
-            f"{math.degrees(DOUBTFUL_ROLL):.0f}: it may be a wall or a slope; [pose] in the camera file would tell",
+            f"{math.degrees(DOUBTFUL_ROLL):.0f}: it may be a wall or a slope; give [pose] in the camera file to decide",
             file=sys.stderr,
         )
 
 
 def attitude(points: np.ndarray, rig: Rig, args: StereoArgs) -> tuple[np.ndarray, float, Floor | None]:
-    """Up in the rectified camera frame, height [m] of the camera over the floor, and the floor if it was found.
+    """Up in the rectified camera frame, height [m] of the camera above the floor, and the floor if one was found.
 
-    A pose of the camera file is refined by the floor that it agrees with. Without one, the camera is taken to be held
-    upright, and the floor to be below it.
+    A pose from the camera file is refined with a floor that agrees with it. Without a pose, the camera is assumed to be
+    held upright, with the floor below it.
     """
     given = rig.up
     cone = UNKNOWN_CONE if given is None else KNOWN_CONE
@@ -146,13 +146,13 @@ def attitude(points: np.ndarray, rig: Rig, args: StereoArgs) -> tuple[np.ndarray
     if floor is not None:
         return floor.up, -floor.offset, floor
     if given is None or said is None:
-        message = "shows no floor that could be found; give pitch and height of the camera as [pose] of the camera file"
+        message = "shows no detectable floor; give pitch and height of the camera as [pose] in the camera file"
         raise InputError(message, file=args.left)
     return given, said, None
 
 
 def level_frame(up: np.ndarray) -> np.ndarray:
-    """Rotation [3, 3] of the camera frame to x ahead (or, for a camera that looks straight down, as its top), z up."""
+    """Rotation [3, 3] from the camera frame to x ahead (the picture's top, if the camera looks straight down), z up."""
     ahead = np.array([0.0, 0.0, 1.0]) if abs(up[2]) < 0.99 else np.array([0.0, -1.0, 0.0])
     x = ahead - (ahead @ up) * up
     x /= np.linalg.norm(x)
@@ -160,7 +160,7 @@ def level_frame(up: np.ndarray) -> np.ndarray:
 
 
 def transform(R: np.ndarray, height: float) -> list[list[float]]:
-    """The rigid motion [4, 4] from the rectified camera frame to that of the map."""
+    """The rigid motion [4, 4] from the rectified camera frame to the map frame."""
     T = np.eye(4)
     T[:3, :3], T[2, 3] = R, height
     return T.tolist()

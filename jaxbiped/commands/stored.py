@@ -30,8 +30,8 @@ def main(args: StoredArgs) -> int:
       Exit status 0.
 
     Raises:
-      InputError: folders that hold no results, or damaged ones, or other arenas than each other; a strategy or point
-        that is not there; `out` exists or cannot be written.
+      InputError: folders with no results, with damaged ones, or with different arenas; a strategy or point
+        that does not exist; `out` exists or cannot be written.
     """
     if args.plan_power != (args.wanted_difference is not None):
         missing = "wanted-difference" if args.plan_power else "plan-power"
@@ -57,14 +57,14 @@ def main(args: StoredArgs) -> int:
 
 
 def tested(args: StoredArgs, frame: pl.DataFrame, comparison: Comparison) -> tuple[Sheet, ...]:
-    """Tables of the equivalence tests that were asked for."""
+    """Tables of the requested equivalence tests."""
     margins = {name: getattr(args, f"margin_{name}") for name in ("success", "distance", "time")}
     margins = {name: margin for name, margin in margins.items() if margin is not None}
     return equivalence_sheets(equivalences(frame, *comparison.question, margins, 1 - args.level)) if margins else ()
 
 
 def foreseen(args: StoredArgs, frame: pl.DataFrame, comparison: Comparison) -> tuple[str, ...]:
-    """How many arenas the wanted difference takes, where that was asked for."""
+    """How many arenas the wanted difference takes, if requested."""
     if args.wanted_difference is None:
         return ()
     first, second = comparison.question
@@ -73,16 +73,16 @@ def foreseen(args: StoredArgs, frame: pl.DataFrame, comparison: Comparison) -> t
 
 
 def left_out(sides: tuple[Side, Side], frame: pl.DataFrame) -> tuple[str, ...]:
-    """What is not compared, and which of the studies has not ended."""
+    """What is not compared, and which of the studies is unfinished."""
     sentences = []
     for folder in dict.fromkeys(side.stored.folder for side in sides):
         manifest = next(side.stored.manifest for side in sides if side.stored.folder == folder)
         if manifest.state != "finished":
-            sentences.append(f"{folder} is not finished: it is to have {manifest.arenas:,} arenas.")
+            sentences.append(f"{folder} is not finished: it has {manifest.arenas:,} arenas in total.")
     most = max(len(side.rows) for side in sides)
     shared = frame["arena"].n_unique()
     if shared < most:
-        sentences.append(f"{most - shared:,} arenas that one side has and the other has not are left out.")
+        sentences.append(f"{most - shared:,} arenas that only one side has are left out.")
     return tuple(sentences)
 
 
@@ -94,7 +94,7 @@ def write(
     tests: tuple[Sheet, ...],
     sentences: tuple[tuple[str, ...], tuple[str, ...]],
 ) -> None:
-    """A folder with `comparison.md` and a page."""
+    """Write a folder with `comparison.md` and a page."""
     title, (said, planned) = question(comparison), sentences
     manifests = {side.stored.folder: side.stored.manifest for side in sides}
     commands = (*(manifest.command for manifest in manifests.values()), command_line())

@@ -1,4 +1,4 @@
-"""`jaxbiped tune`: costs that make missions short, found on training arenas and judged on others."""
+"""`jaxbiped tune`: costs that make missions short, found on training arenas and evaluated on others."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def main(args: TuneArgs) -> int:
       InputError: a config that cannot be run, a folder that exists or cannot be written, a full disk.
     """
     config = TuneConfig.model_validate(args.model_dump(exclude={"out", "from_durations"}))
-    program(config.mission, (SIZE_X, SIZE_Y))  # refuses what does not fit before anything is computed
+    program(config.mission, (SIZE_X, SIZE_Y))  # refuses invalid configs before anything is computed
     refuse_timeless(config)
     kind = f"-{args.from_durations}" if args.from_durations else ""
     out = args.out or Path("results") / f"tune{kind}-{config_hash(config)}"
@@ -55,7 +55,7 @@ def main(args: TuneArgs) -> int:
     with new_folder(out) as folder:
         write_manifest(folder, config, command, wall)
         for name, table in tables(tuning).items():
-            buffer = io.BytesIO()  # polars would turn a full disk into an error of its own
+            buffer = io.BytesIO()  # polars would raise its own error on a full disk
             table.write_parquet(buffer)
             write_whole(folder / f"{name}.parquet", partial(write, buffer.getvalue()))
         write_tuning(folder, tuning, config, command)
@@ -66,12 +66,12 @@ def main(args: TuneArgs) -> int:
 
 
 def tables(tuning: Tuning) -> dict[str, pl.DataFrame]:
-    """What is stored, by file name."""
+    """The stored tables, by file name."""
     return {"history": tuning.history, "sweep": tuning.swept, "test": tuning.test}
 
 
 def refuse_timeless(config: TuneConfig) -> None:
-    """Raise `InputError` where durations say nothing: a move and a measurement that both take no time."""
+    """Raise `InputError` if durations carry no information: a move and a measurement that both take no time."""
     durations = config.mission.durations
     if durations.straight + durations.measure <= 0:
         raise InputError("must be above 0, or measure must", field="durations.straight", value=durations.straight)
@@ -88,12 +88,12 @@ def fits(config: TuneConfig, source: str) -> dict[str, Fit]:
     return {
         "straight moves": fit(durations, diagonal=False),
         "straight and diagonal": fit(durations),
-        f"the same, {durations.measure:g} s of measuring a move": fit(durations, measuring=True),
+        f"the same, {durations.measure:g} s of measuring per move": fit(durations, measuring=True),
     }
 
 
 def fitted(config: TuneConfig, source: str, out: Path, command: str, console: Console) -> int:
-    """`--from-durations`: costs in closed form. Writes those with measurements, which a mission's clock counts."""
+    """`--from-durations`: costs in closed form. Writes those with measurements, which count in a mission's time."""
     measure = config.mission.durations.measure
     table = "Table 2" if config.mission.durations == DurationConfig(measure=measure) else "the durations given"
     title = f"Costs from {table if source == 'table' else 'measured primitives'}"
@@ -103,7 +103,7 @@ def fitted(config: TuneConfig, source: str, out: Path, command: str, console: Co
     costs = tuple(float(f"{cost:.4g}") for cost in (max(last.costs[0], 0.1), *last.costs[1:], config.mission.costs.c4))
     comments = (
         f"Written by: {command}",
-        "C0 to C3 from durations, a measurement a move included; C4 is not from these.",
+        "C0 to C3 from durations, including one measurement per move; C4 cannot be derived from these.",
     )
     with new_folder(out) as folder:
         write_manifest(folder, config, command, None)
@@ -117,12 +117,12 @@ def fitted(config: TuneConfig, source: str, out: Path, command: str, console: Co
 
 
 def write(content: bytes, file: BinaryIO) -> None:
-    """Into an open file."""
+    """Write content to an open file."""
     file.write(content)
 
 
 def write_manifest(folder: Path, config: TuneConfig, command: str, wall: float | None) -> None:
-    """`manifest.json`: how the folder came to be."""
+    """Write `manifest.json`: how the folder was made."""
     manifest = {
         "command": command,
         "config": config.model_dump(mode="json"),

@@ -15,8 +15,8 @@ def main(args: ViewArgs) -> int:
     """Run the command; exit status 0.
 
     Raises:
-      InputError: nothing to be shown there, an arena, strategy or point that is not there, viser is not installed, or
-        the port is taken.
+      InputError: nothing to show, an arena, strategy or point that does not exist, viser is not installed, or
+        the port is in use.
     """
     require()
     refuse_taken(args.host, args.port)
@@ -37,14 +37,14 @@ def main(args: ViewArgs) -> int:
 
 
 def reached_at(host: str) -> str:
-    """The name in the URL of what listens to an address."""
+    """The host name in the URL of a server that listens on an address."""
     if host in ("0.0.0.0", "::", ""):
         return "localhost"
     return f"[{host}]" if ":" in host else host
 
 
 def wait() -> None:
-    """Until Ctrl-C."""
+    """Wait until Ctrl-C."""
     try:
         while True:
             time.sleep(3600)
@@ -53,7 +53,7 @@ def wait() -> None:
 
 
 def beginning(found: Missions, args: ViewArgs) -> Place:
-    """Strategy, point and arena of the mission to begin with."""
+    """Strategy, point and arena of the mission to start with."""
     if not isinstance(found, Study):
         for name in ("strategy", "point"):
             if getattr(args, name) is not None:

@@ -1,4 +1,4 @@
-"""What all rooms share."""
+"""Code shared by all rooms."""
 
 from jaxbiped.core.lazy_loading import lazy_package
 

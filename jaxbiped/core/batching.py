@@ -1,4 +1,4 @@
-"""Batches of any rank, `vmap` and `grad` of functions that are written for one leading batch axis."""
+"""Batches of any rank, `vmap` and `grad` for functions that are written for one leading batch axis."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from jaxbiped.errors import InputError
 
 
 def fold(array: np.ndarray | jax.Array, batch: tuple[int, ...], core: int) -> np.ndarray | jax.Array:
-    """An array broadcast to the leading axes `batch`, which become one; its last `core` axes stay as they are.
+    """An array broadcast to the leading axes `batch`, which become one; its last `core` axes are unchanged.
 
-    NumPy arrays stay NumPy arrays, so that nothing is copied to a device before it must be.
+    NumPy arrays stay NumPy arrays, so that nothing is copied to a device too early.
     """
     numpy = np if isinstance(array, np.ndarray) else jnp
     ends = array.shape[array.ndim - core :]
@@ -26,14 +26,14 @@ def fold(array: np.ndarray | jax.Array, batch: tuple[int, ...], core: int) -> np
 
 
 def unfold(tree, batch: tuple[int, ...]):
-    """Leaves [B, ...] with their first axis divided into those of `batch` again: the inverse of `fold`."""
+    """Leaves [B, ...] with their first axis split into those of `batch`: the inverse of `fold`."""
     if len(batch) == 1:
         return tree
     return jax.tree.map(lambda leaf: leaf.reshape(*batch, *leaf.shape[1:]), tree)
 
 
 def folding_vmap(function: Callable) -> Callable:
-    """`function` of pytrees whose leaves all have the batch first, so that `vmap` adds its axis to that batch.
+    """`function` of pytrees with the batch axis first, for which `vmap` extends that batch.
 
     For functions that call a compiled kernel, which has a fixed rank. Results must have the batch first, too, and an
     arena's result must not depend on the others of its batch.
@@ -54,9 +54,9 @@ def folding_vmap(function: Callable) -> Callable:
 
 
 def without_gradient(function: Callable, instead: str) -> Callable:
-    """`function`, which says what to use in its place where it would be differentiated.
+    """`function`, with an error that names an alternative if it is differentiated.
 
-    Where it is only part of a program that is differentiated by other things, its gradient is zero.
+    If it is only part of a program that is differentiated with respect to other inputs, its gradient is zero.
     """
     guarded = jax.custom_jvp(function)
 

@@ -1,4 +1,4 @@
-"""Where compiled programs are kept on disk between processes: under the user's cache folder."""
+"""Location of compiled programs on disk between processes: in the user's cache folder."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 VARIABLE = "JAXBIPED_CACHE"  # a folder, or "off"
 OFF = "off"
 KERNELS, PROGRAMS = "kernels", "programs"  # folders in it
-MOST_PROGRAMS = 500_000_000  # bytes of all executables
+MOST_PROGRAMS = 500_000_000  # maximum size of all executables in bytes
 
 
 def cache_folder() -> Path | None:
-    """The folder, which need not exist; None where nothing is to be kept."""
+    """The folder, which need not exist; None if nothing is to be kept."""
     asked = os.environ.get(VARIABLE, "").strip()
     if asked.lower() == OFF:
         return None
@@ -21,7 +21,7 @@ def cache_folder() -> Path | None:
         if asked:
             return Path(asked).expanduser()
         home = Path.home()
-    except RuntimeError:  # a process without a home, or a user who is not known
+    except RuntimeError:  # a process without a home directory, or an unknown user
         return None
     if sys.platform == "darwin":
         return home / "Library" / "Caches" / "jaxbiped"

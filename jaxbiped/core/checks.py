@@ -1,7 +1,7 @@
 """Checks of the arguments of public functions: rank, shape and dtype at every call, values where they are concrete.
 
-Under `jit` and `vmap` values are not known when a function is called. Functions whose answer depends on a value that
-this module would refuse say in their docstring what they do about it there.
+Under `jit` and `vmap`, values are not known when a function is called. Functions whose result depends on a value that
+this module would reject document what they do in that case.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ def is_concrete(array: Any) -> bool:
 
 
 def as_array(name: str, value: Any) -> np.ndarray | jax.Array:
-    """Arrays as they are; numbers and nested lists as NumPy arrays.
+    """Arrays unchanged; numbers and nested lists as NumPy arrays.
 
     Raises:
-      InputError: what is no array of numbers.
+      InputError: a value that is not an array of numbers.
     """
     if isinstance(value, (np.ndarray, jax.Array)):
         return value
@@ -40,9 +40,9 @@ def integers(name: str, value: Any, core: str = "", between: tuple[int, int] | N
     """An array of integers, checked.
 
     Args:
-      name: of the argument, for the message.
-      core: its last axes, as of `leading_shape`; fewer axes are refused.
-      between: the least and the greatest value allowed; checked where values are concrete.
+      name: name of the argument, for the message.
+      core: its last axes, as for `leading_shape`; fewer axes are rejected.
+      between: smallest and greatest value allowed; checked if values are concrete.
 
     Raises:
       InputError: another dtype, too few axes, a value out of range.
@@ -60,17 +60,17 @@ def integers(name: str, value: Any, core: str = "", between: tuple[int, int] | N
 
 
 def reals(name: str, value: Any, core: str = "") -> np.ndarray | jax.Array:
-    """An array of real numbers as float32 (a NumPy or a JAX array), checked as by `integers`."""
+    """An array of real numbers as float32 (a NumPy or a JAX array), checked like `integers`."""
     array = as_array(name, value)
     if not np.issubdtype(array.dtype, np.floating) and not np.issubdtype(array.dtype, np.integer):
         raise InputError(f"must be real numbers {shape_text(core)}, not {described(array)}", field=name)
     _check_rank(name, array, core)
-    with np.errstate(over="ignore"):  # what is too large for a float32 is infinite
+    with np.errstate(over="ignore"):  # values too large for a float32 become infinite
         return array if array.dtype == np.float32 else array.astype(np.float32)
 
 
 def flags(name: str, value: Any, core: str = "") -> np.ndarray | jax.Array:
-    """An array of booleans, checked as by `integers`."""
+    """An array of booleans, checked like `integers`."""
     array = as_array(name, value)
     if array.dtype != np.bool_:
         raise InputError(f"must be true or false {shape_text(core)}, not {described(array)}", field=name)
@@ -79,14 +79,14 @@ def flags(name: str, value: Any, core: str = "") -> np.ndarray | jax.Array:
 
 
 def bounds(array: np.ndarray | jax.Array) -> tuple[int, int]:
-    """Least and greatest element of a concrete array that is not empty."""
+    """Smallest and greatest element of a concrete array that is not empty."""
     on_host = isinstance(array, np.ndarray) or all(device.platform == "cpu" for device in array.devices())
     array = np.asarray(array) if on_host else array
     return int(array.min()), int(array.max())
 
 
 def finite(name: str, value: Any, least: float = -np.inf, greatest: float = np.inf) -> None:
-    """Check that all numbers of an array are finite and within limits, where its values are concrete.
+    """Check that all numbers of an array are finite and within limits, if its values are concrete.
 
     Raises:
       InputError: names the first number that is not.
@@ -103,14 +103,14 @@ def finite(name: str, value: Any, least: float = -np.inf, greatest: float = np.i
 
 
 def cells(name: str, value: Any) -> np.ndarray | jax.Array:
-    """Rows and columns [..., 2] as int32. What does not fit is outside any grid, and stays outside."""
+    """Rows and columns [..., 2] as int32. Values that do not fit are outside any grid, and stay outside."""
     array = integers(name, value, "2")
     leading_shape(**{name: (array, "2")})
     return narrowed(array, np.int32)
 
 
 def narrowed(array: np.ndarray | jax.Array, dtype: type, low: int | None = None, high: int | None = None):
-    """Integers as `dtype`; those below `low` or above `high`, by default what the dtype holds, become these."""
+    """Integers as `dtype`, clipped to `low` and `high`, by default the range of the dtype."""
     if array.dtype == dtype and low is None and high is None:
         return array
     held, wanted = np.iinfo(array.dtype), np.iinfo(dtype)
@@ -124,8 +124,8 @@ def leading_shape(**arguments: tuple[np.ndarray | jax.Array, str]) -> tuple[int,
     """The common shape of the leading axes of some arrays, broadcast as NumPy does.
 
     Args:
-      arguments: each an array and its last axes, such as "H W" or "8 H W" or "": a number is a size, a letter is a size
-        that is the same in all arguments.
+      arguments: for each, an array and its last axes, such as "H W" or "8 H W" or "": a number is a size, a letter is a
+        size that is the same in all arguments.
 
     Raises:
       InputError: axes that differ, or that do not broadcast.
@@ -160,7 +160,7 @@ def shape_of(array: np.ndarray | jax.Array) -> str:
 
 
 def shape_text(core: str) -> str:
-    """What the last axes of an argument are, for messages: "[..., H, W]"."""
+    """The last axes of an argument, for messages: "[..., H, W]"."""
     return f"[{', '.join(['...', *core.split()])}]"
 
 
@@ -173,7 +173,7 @@ def whole_number(name: str, value: Any, least: int = 0) -> int:
     """A static argument that must be an integer, `least` or more.
 
     Raises:
-      InputError: anything else, also a traced number.
+      InputError: anything else, including a traced number.
     """
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         shown = value if isinstance(value, (int, float, str)) else type(value).__name__

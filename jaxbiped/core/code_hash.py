@@ -1,4 +1,4 @@
-"""Digests of code that users bring, so that two studies with different code do not pass for the same."""
+"""Digests of users' code, so that two studies with different code are not mistaken for the same."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ PLAIN = bool | int | float | complex | str | bytes | None
 def component_hash(component: Any) -> str:
     """Twelve hex digits of a component's type, code, static fields and numbers.
 
-    The code is the whole text of the modules that its classes and functions are from, where there is a file, since
-    they call what is beside them; else, as in a notebook, their own text. What functions hold in closures, defaults and
-    `functools.partial` counts. What they import from elsewhere is not covered.
+    The code is the whole text of the modules that define its classes and functions, if they are files, since these call
+    other code in them; otherwise, as in a notebook, their own text. Values in closures, defaults and
+    `functools.partial` are included. Imports from elsewhere are not covered.
     """
     made = hashlib.sha256()
     for part in parts(component, set()):
@@ -32,7 +32,7 @@ def component_hash(component: Any) -> str:
 
 
 def parts(value: Any, seen: set[int]) -> Iterator[str]:
-    """Texts that change with a value, its code or what it holds, and that are the same in every process."""
+    """Texts that change with a value, its code or its content, and that are the same in every process."""
     if isinstance(value, PLAIN):
         yield repr(value)
         return
@@ -76,7 +76,7 @@ def parts(value: Any, seen: set[int]) -> Iterator[str]:
 
 
 def cells(function: types.FunctionType) -> list[Any]:
-    """What a function holds from around it."""
+    """The values in a function's closure."""
     held = []
     for cell in function.__closure__ or ():
         try:
@@ -87,7 +87,7 @@ def cells(function: types.FunctionType) -> list[Any]:
 
 
 def sources(thing: Any) -> Iterator[str]:
-    """The name of a class with its bases, or of a function, and the text of the modules they are from but for ours."""
+    """The name of a class with its bases, or of a function, and the text of their modules, except ours."""
     classes = inspect.getmro(thing) if isinstance(thing, type) else (thing,)
     for item in classes:
         module = getattr(item, "__module__", "") or ""
@@ -107,6 +107,6 @@ def sources(thing: Any) -> Iterator[str]:
 
 
 def compiled(code: types.CodeType) -> str:
-    """What code that has no text is compiled to."""
+    """A text for compiled code that has no source."""
     constants = [compiled(item) if isinstance(item, types.CodeType) else repr(item) for item in code.co_consts]
     return f"{code.co_code.hex()} {constants} {code.co_names}"

@@ -1,4 +1,4 @@
-"""What every component must be that people bring: a frozen dataclass that is a pytree of numbers."""
+"""Requirements on users' components: a frozen dataclass that is a pytree of numbers."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ def check_component(thing: object, base: type, where: str, hint: str = "") -> No
     """Raise `InputError` unless an object can take part in a compiled program.
 
     Args:
-      base: that it must be an instance of.
-      where: the name that messages begin with.
-      hint: what to do with something that is not an instance.
+      base: required base class.
+      where: the name with which messages begin.
+      hint: advice for objects of other classes.
     """
     kind = type(thing).__name__
     if not isinstance(thing, base):
         raise InputError(f"must be a {base.__name__}, not {kind}{hint}", field=where)
     leaves = jax.tree.leaves(thing)
     if len(leaves) == 1 and leaves[0] is thing:
-        raise InputError(f"{kind} is no pytree; decorate it with jax.tree_util.register_dataclass", field=where)
+        raise InputError(f"{kind} is not a pytree; decorate it with jax.tree_util.register_dataclass", field=where)
     for leaf in leaves:
         try:
             jnp.asarray(leaf)
         except TypeError:
-            message = f"{kind} holds a {type(leaf).__name__}; what is no number must be a static field"
+            message = f"{kind} holds a {type(leaf).__name__}; fields that are not numbers must be static"
             raise InputError(message, field=where) from None
     for item in fields(thing) if is_dataclass(thing) else ():
         if item.metadata.get("static"):
@@ -43,7 +43,7 @@ def check_component(thing: object, base: type, where: str, hint: str = "") -> No
 
 
 def as_component(thing: object, base: type[C], where: str) -> C:
-    """A component of something that stands for one: an object of a class derived from `base`, or the class.
+    """The component given as an object of a class derived from `base`, or as the class.
 
     Raises:
       InputError: anything else.
@@ -55,12 +55,12 @@ def as_component(thing: object, base: type[C], where: str) -> C:
 
 
 def traced_component(component: C) -> C:
-    """A component with its numbers as arrays of the types that programs compute with."""
+    """A component with its numbers as arrays of the types used in programs."""
     return jax.tree.map(lambda leaf: np.asarray(leaf, jax.dtypes.canonicalize_dtype(np.asarray(leaf).dtype)), component)
 
 
 def numbers_of(component: Any) -> tuple[str, ...]:
-    """The fields of a component that a sweep may change: those that hold one number each."""
+    """The fields of a component that a sweep may change: those with one number each."""
     if component is None or not is_dataclass(component):
         return ()
     names = [f.name for f in fields(component) if not (f.metadata.get("static") or f.metadata.get("derived"))]
@@ -75,6 +75,6 @@ def with_numbers(component: C, numbers: dict[str, float]) -> C:
 
 
 def kind_of(component: Any) -> tuple:
-    """What decides its compiled program: the structure of the component, and the shapes of its numbers."""
+    """The key of its compiled program: the structure of the component, and the shapes of its numbers."""
     leaves, structure = jax.tree.flatten(component)
     return structure, *((np.shape(leaf), np.asarray(leaf).dtype.kind) for leaf in leaves)

@@ -1,4 +1,4 @@
-"""Parts of a config that may lie in a TOML file of their own, such as a robot or a camera."""
+"""Parts of a config that may be in separate TOML files, such as a robot or a camera."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ FILE = "file"  # key of a table that names one
 
 
 class FileModel(Model):
-    """A model that a TOML file of its own may give: `"robot.toml"` in its place, or a table with the key `file`.
+    """A model that may be given by a separate TOML file: `"robot.toml"` instead of a table, or a table with a key
+    `file`.
 
-    What the table gives besides wins over the file. The rule is the same for the command line, TOML and Python.
+    Other values in the table override the file. The rule is the same for the command line, TOML and Python.
     """
 
     @pydantic.model_validator(mode="before")
@@ -30,13 +31,13 @@ class FileModel(Model):
 
 
 def with_file(model: type[Model], data: Any) -> Any:
-    """The fields of a model as they are given, those of a file that is named among them.
+    """The given fields of a model, merged with those of a file named among them.
 
     Args:
-      data: of the model; what names no file is returned as it is.
+      data: data of the model; returned unchanged if it names no file.
 
     Raises:
-      InputError: a file that is missing, no TOML, or gives a field that is wrong.
+      InputError: a file that is missing, not TOML, or has a wrong field.
     """
     given = {FILE: data} if isinstance(data, str | Path) else data
     if not isinstance(given, Mapping) or FILE not in given:
@@ -50,6 +51,6 @@ def with_file(model: type[Model], data: Any) -> Any:
     try:
         model.model_validate(table)
     except pydantic.ValidationError as error:
-        if error.errors()[0]["loc"]:  # else it is about several fields, and some may be given besides
+        if error.errors()[0]["loc"]:  # otherwise it concerns several fields, and some may be given separately
             raise input_error(error, file=path) from None
     return table | {name: value for name, value in given.items() if name != FILE}

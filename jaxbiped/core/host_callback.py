@@ -1,8 +1,8 @@
-"""Calls of Python functions from inside compiled programs, on a CPU without any JAX on the way.
+"""Calls of Python functions from inside compiled programs, on a CPU without any involvement of JAX.
 
-`jax.pure_callback` hands its function arrays that JAX makes while it waits for the program, which can wait for ever
-where all threads of the device are busy. Here XLA calls a C function of ours through its foreign function interface
-(see `core.xla_ffi`), which makes NumPy arrays of the memory itself. On other devices it is
+`jax.pure_callback` passes arrays that JAX creates while it waits for the program, which can deadlock if all threads of
+the device are busy. Here XLA calls a C function of ours through its foreign function interface (see
+`core.xla_ffi`), which wraps the memory itself as NumPy arrays. On other devices it is
 `jax.pure_callback`.
 """
 
@@ -19,12 +19,12 @@ import jax.numpy as jnp
 import numpy as np
 
 NAME = "jaxbiped_host_call"
-# Places of the fields, in words of 8 bytes from the beginning of their structure; as in `core.xla_ffi`.
+# Offsets of the fields, in words of 8 bytes from the beginning of their structure; as in `core.xla_ffi`.
 FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULT_COUNT, FRAME_RESULTS = 1, 7, 9, 12, 14
 BUFFER_DTYPE, BUFFER_DATA, BUFFER_RANK, BUFFER_SHAPE = 2, 3, 4, 5
 EXTENSION_TYPE, EXTENSION_METADATA, METADATA_VERSION, METADATA = 1, 3, 3, 1
 VERSION = 1 << 32  # major 0 in the lower half of the word, minor 1 in the upper
-DTYPES = {1: np.bool_, 2: np.int8, 4: np.int32, 8: np.uint32, 11: np.float32}  # of XLA's, those that are used
+DTYPES = {1: np.bool_, 2: np.int8, 4: np.int32, 8: np.uint32, 11: np.float32}  # XLA's types, those that are used
 
 Function = Callable[..., Sequence[np.ndarray]]
 FUNCTIONS: dict[int, Function] = {}
@@ -37,9 +37,9 @@ def host_call(
     """`function(*arguments)`, called on the host with NumPy arrays that it must not keep, once for the whole batch.
 
     Args:
-      function: returns arrays as `results` say; must not raise.
+      function: returns arrays that match `results`; must not raise.
       results, arguments: bool, int8, int32, uint32 or float32.
-      vmap_method: as of `jax.pure_callback`; by default `jax.vmap` of it is an error.
+      vmap_method: as for `jax.pure_callback`; by default `jax.vmap` of it is an error.
     """
     number = next((n for n, known in FUNCTIONS.items() if known is function), None)
     if number is None:
@@ -72,7 +72,7 @@ def words(address: int, count: int):
 
 
 def array(buffer: int) -> np.ndarray:
-    """The array that a buffer of XLA holds, in place."""
+    """The array in an XLA buffer, without a copy."""
     fields = words(buffer, BUFFER_SHAPE + 1)
     rank = fields[BUFFER_RANK]
     shape = tuple(words(fields[BUFFER_SHAPE], rank)) if rank else ()
@@ -85,7 +85,7 @@ def array(buffer: int) -> np.ndarray:
 
 @ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
 def handler(address):
-    """What XLA calls with the address of a call frame."""
+    """The function that XLA calls with the address of a call frame."""
     frame = words(address, FRAME_RESULTS + 1)
     if frame[FRAME_EXTENSION]:
         extension = words(frame[FRAME_EXTENSION], EXTENSION_METADATA + 1)
@@ -96,9 +96,9 @@ def handler(address):
         number, *arguments = map(array, words(frame[FRAME_ARGUMENTS], frame[FRAME_ARGUMENT_COUNT]))
         outs = [array(buffer) for buffer in words(frame[FRAME_RESULTS], frame[FRAME_RESULT_COUNT])]
         for out in outs:
-            out[...] = 0  # what is left where the function fails
+            out[...] = 0  # the result if the function fails
         for out, made in zip(outs, FUNCTIONS[int(number.flat[0])](*arguments), strict=True):
             out[...] = made
-    except BaseException:  # there is nobody to catch it
+    except BaseException:  # nothing could catch it
         traceback.print_exc()
     return None

@@ -1,7 +1,7 @@
-"""Pictures of more than 8 bits a sample: which they are, and their samples, none of whose bits are lost.
+"""Pictures with more than 8 bits per sample: detection, and reading without loss of bits.
 
-Pillow reads every kind of picture, but brings colour of more than 8 bits down to 8 without a word, takes white for
-black in deep TIFF files, and does not know some of these at all. OpenCV keeps the bits, where it is asked to.
+Pillow reads every kind of picture, but silently reduces colour of more than 8 bits to 8, confuses white and black in
+deep TIFF files, and does not support some of these. OpenCV keeps the bits, if asked to.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ import numpy as np
 from PIL import TiffImagePlugin
 
 PNG, TIFF = b"\x89PNG\r\n\x1a\n", (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-DEEP_COLOUR = ("JPEG2000", "AVIF")  # other formats that may hold it; their headers are not looked into
+DEEP_COLOUR = ("JPEG2000", "AVIF")  # other formats that may hold it; their headers are not read
 WIDTH, HEIGHT, BITS, COLOURS = 256, 257, 258, 262  # tags of TIFF
 WHITE_IS_0, BLACK_IS_0, RGB = 0, 1, 2  # of COLOURS
 
 
 class UnsupportedError(Exception):
-    """A kind of picture that is whole, as far as can be seen, and that nothing here can read; the text says which."""
+    """A kind of picture that appears to be intact, but that cannot be read here; the text says which."""
 
 
 def sample_bits(data: bytes) -> int:
-    """Bits of a sample of a picture, by the first kilobytes of its file; 8 where its format holds no more."""
+    """Bits per sample of a picture, from the first kilobytes of its file; 8 if its format holds no more."""
     if data.startswith(PNG):
         return data[24] if len(data) > 24 else 8
     if re.match(rb"P[2356]\s", data):
@@ -42,7 +42,7 @@ def sample_bits(data: bytes) -> int:
 
 
 def tiff_tags(data: bytes) -> dict[int, object]:
-    """The tags of the first page of a TIFF file; none where it is damaged."""
+    """The tags of the first page of a TIFF file; none if it is damaged."""
     stream = io.BytesIO(data)
     head = stream.read(16 if b"+" in data[:4] else 8)
     try:
@@ -51,14 +51,14 @@ def tiff_tags(data: bytes) -> dict[int, object]:
             stream.seek(tags.next)
             tags.load(stream)
         return {tag: tags[tag] for tag in (WIDTH, HEIGHT, BITS, COLOURS) if tag in tags}
-    except Exception:  # whatever a damaged file makes Pillow trip over; reading the picture says that it is
+    except Exception:  # any error of Pillow for a damaged file; reading the picture will report it
         return {}
 
 
 def deep_samples(data: bytes) -> np.ndarray | None:
-    """Samples [H, W] or RGB [H, W, 3] of a picture of more than 8 bits, upright as its EXIF tag says; no alpha.
+    """Samples [H, W] or RGB [H, W, 3] of a picture of more than 8 bits, rotated by its EXIF tag; without alpha.
 
-    None where OpenCV cannot read it.
+    None if OpenCV cannot read it.
 
     Raises:
       UnsupportedError: TIFF in other colours than grey or RGB, or of a kind whose bits OpenCV drops.
@@ -67,12 +67,12 @@ def deep_samples(data: bytes) -> np.ndarray | None:
     tags = tiff_tags(data) if data.startswith(TIFF) else {}
     colours = tags.get(COLOURS, BLACK_IS_0)
     if colours not in (WHITE_IS_0, BLACK_IS_0, RGB):
-        raise UnsupportedError(f"TIFF of {bits} bits a sample in other colours than grey or RGB")
+        raise UnsupportedError(f"TIFF of {bits} bits per sample in other colours than grey or RGB")
     samples = decode(data)
     if samples is None:
         return None
     if samples.dtype.itemsize * 8 < bits:
-        raise UnsupportedError(f"TIFF of {bits} bits a sample with such channels")
+        raise UnsupportedError(f"TIFF of {bits} bits per sample with such channels")
     if colours == WHITE_IS_0:
         if samples.dtype.kind != "u":
             raise UnsupportedError("TIFF in which 0 is white and samples are not whole numbers from 0 on")
@@ -81,7 +81,7 @@ def deep_samples(data: bytes) -> np.ndarray | None:
 
 
 def decode(data: bytes) -> np.ndarray | None:
-    """The picture as OpenCV reads it: of any depth, grey, BGR or BGRA, upright; None where it cannot."""
+    """The picture as OpenCV reads it: of any depth, grey, BGR or BGRA, upright; None if it cannot."""
     flags = cv2.IMREAD_UNCHANGED if data.startswith(TIFF) else cv2.IMREAD_ANYDEPTH | cv2.IMREAD_ANYCOLOR
     before = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     try:
@@ -94,7 +94,7 @@ def decode(data: bytes) -> np.ndarray | None:
 
 @contextlib.contextmanager
 def no_chatter() -> Iterator[None]:
-    """Drop the warnings of Pillow meanwhile, and what libtiff writes to the standard error about each damaged strip."""
+    """Suppress the warnings of Pillow, and what libtiff writes to standard error about each damaged strip."""
     sys.stderr.flush()
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:

@@ -1,8 +1,8 @@
-"""Files of the cache: each is whole and what it was written as, or it is not there.
+"""Files of the cache: each is complete and unchanged, or treated as absent.
 
 A file is written under another name and then renamed: many processes may do so at once. It begins with a line that
-says what it is and with a hash of the rest: one that is damaged, cut short, of another kind or not readable is none. A
-folder that cannot be made, read or written to is done without.
+identifies it and with a hash of the rest: a file that is damaged, truncated, of another kind or not readable is
+ignored. If a folder cannot be created, read or written, nothing is kept.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ DIGEST = 32  # bytes of SHA-256
 
 
 def read(path: Path, kind: bytes) -> bytes | None:
-    """What `write` wrote there, which is now the last to have been used; None where there is no such thing."""
+    """The data that `write` stored there, now marked as most recently used; None if there are none."""
     try:
         data = path.read_bytes()
     except OSError:
@@ -32,7 +32,7 @@ def read(path: Path, kind: bytes) -> bytes | None:
 
 
 def write(path: Path, kind: bytes, data: bytes) -> bool:
-    """Keep `data`, in place of what was there; whether it could be."""
+    """Store `data`, replacing what was there; return whether that was possible."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, prefix=".", delete=False) as file:
@@ -55,23 +55,23 @@ class Kept:
 
     path: Path
     size: int  # [bytes]
-    used: float  # [s] since the epoch, last
+    used: float  # [s] last use, since the epoch
 
 
 def files(folder: Path) -> list[Kept]:
-    """All files in a folder and below it, those first that were used last; none where there is no such folder."""
+    """All files in a folder and below it, most recently used first; none if the folder does not exist."""
     found = []
     for place, _, names in os.walk(folder):
         for name in names:
             path = Path(place) / name
-            with contextlib.suppress(OSError):  # gone meanwhile
+            with contextlib.suppress(OSError):  # removed in the meantime
                 status = path.lstat()
                 found.append(Kept(path, status.st_size, status.st_mtime))
     return sorted(found, key=lambda file: file.used, reverse=True)
 
 
 def prune(folder: Path, most: int) -> None:
-    """Remove the files of a folder that were not used for longest, until the rest is `most` bytes."""
+    """Remove the least recently used files of a folder until the rest is at most `most` bytes."""
     total = 0
     for file in files(folder):
         total += file.size
@@ -82,7 +82,7 @@ def prune(folder: Path, most: int) -> None:
 
 
 def remove_empty(folder: Path) -> None:
-    """Remove the folders below a folder in which nothing is."""
+    """Remove the empty folders below a folder."""
     for place, _, _ in os.walk(folder, topdown=False):
         if Path(place) != folder:
             with contextlib.suppress(OSError):  # not empty

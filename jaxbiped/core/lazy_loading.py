@@ -1,4 +1,4 @@
-"""Packages whose public names load when they are used (PEP 562): a command that needs none of them starts at once."""
+"""Packages whose public names load on first use (PEP 562): a command that needs none of them starts at once."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def lazy_package(package: str, public: Mapping[str, str], modules: str = "") -> 
 
     Args:
       package: its `__name__`.
-      public: names by the module, in the package, that they come from; `old:new` for one that is called otherwise.
-      modules: those of its modules that may be reached by attribute without an import of their own.
+      public: names by the module of the package that defines them; `old:new` for renamed ones.
+      modules: modules that may be reached by attribute without being imported explicitly.
     """
     origins = {}
     for module, names in public.items():
@@ -31,11 +31,11 @@ def lazy_package(package: str, public: Mapping[str, str], modules: str = "") -> 
 
 
 IMPORTED = time.time()  # [s since the epoch] before any other module of the package was read
-REPLACED: set[str] = set()  # what was replaced in modules of such packages since they were loaded
+REPLACED: set[str] = set()  # names replaced in modules of such packages since they were loaded
 
 
 class WatchedModule(ModuleType):
-    """A module that tells when somebody replaces what is in it: programs that were traced before are then others."""
+    """A module that records when its content is replaced: programs traced before are then outdated."""
 
     def __setattr__(self, name: str, value: Any) -> None:
         if not isinstance(value, ModuleType) and not name.startswith("__"):
@@ -58,7 +58,7 @@ class LazyPackage(ModuleType):
         return value
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Where a module and a function of it have one name, that is the function: importing sets the module."""
+        """If a module and its function have the same name, keep the function: importing sets the module."""
         module, there = self.__dict__["origins_"].get(name, (None, None))
         if type(value) is ModuleType and value.__name__ == f"{self.__name__}.{name}":
             value.__class__ = WatchedModule

@@ -1,4 +1,4 @@
-"""A key of all that a compiled program is traced from: the same in every process, another where anything differs."""
+"""A key of everything that a compiled program is traced from: equal in every process, different after any change."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ XLA_FLAGS = os.environ.get("XLA_FLAGS", "")  # as XLA reads them, once
 TRUSTED = (
     *("jaxbiped", "pydantic", "dataclasses", "abc", "enum", "typing", "functools", "contextlib", "jaxtyping"),
     *("collections", "beartype"),
-)  # modules from which functions come into our classes
+)  # modules whose functions appear in our classes
 
 
 def program_key(name: str, arguments: tuple, static: Any) -> str | None:
-    """Forty hex digits of all that a program is traced from; None where that is not all known.
+    """Forty hex digits of everything that a program is traced from; None if that is not fully known.
 
     Args:
-      name: of the traced function.
-      arguments: of the program: arrays, or anything with a shape and type.
-      static: all else that the program depends on.
+      name: name of the traced function.
+      arguments: arguments of the program: arrays, or anything with a shape and type.
+      static: everything else that the program depends on.
     """
     if REPLACED or not has_one_device() or has_foreign_methods():
         return None
@@ -54,12 +54,12 @@ def program_key(name: str, arguments: tuple, static: Any) -> str | None:
 
 
 def has_one_device() -> bool:
-    """Whether this process is alone, with one device, which nobody has chosen."""
+    """Whether this process is alone, with one device that nobody has selected explicitly."""
     return jax.process_count() == 1 and len(jax.devices()) == 1 and jax.config.jax_default_device is None
 
 
 def facts() -> tuple[str, ...]:
-    """What holds for all programs of this process."""
+    """Facts common to all programs of this process."""
     plain = [value for value in trace_settings() if isinstance(value, PLAIN | enum.Enum)]
     others = {name: value for name, value in jax.config.values.items() if "cache" not in name}
     return (*of_this_machine(), repr(plain), repr(sorted(others.items())), XLA_FLAGS)
@@ -67,7 +67,7 @@ def facts() -> tuple[str, ...]:
 
 @cache
 def of_this_machine() -> tuple[str, ...]:
-    """What does not change while it runs."""
+    """Facts that do not change while it runs."""
     device = jax.local_devices()[0]
     client = device.client
     versions = jax.__version__, jaxlib.__version__, np.__version__, client.platform_version
@@ -76,10 +76,10 @@ def of_this_machine() -> tuple[str, ...]:
 
 @cache
 def package_hash() -> str:
-    """Of the text of this package, and of the data that come with it.
+    """Hash of the text of this package, and of its data files.
 
     Raises:
-      OSError: where that cannot be read, is not there, or is not what was imported.
+      OSError: the files cannot be read, are missing, or are not those that were imported.
     """
     made, files = hashlib.sha256(), sorted(PACKAGE.rglob("*"))
     if not any(file.suffix == ".py" for file in files):
@@ -99,12 +99,12 @@ def trace_settings() -> tuple:
 
 
 def compile_settings() -> tuple:
-    """Those beside them that change how it is compiled."""
+    """Further settings that change how it is compiled."""
     return tuple(map(jax.config.values.get, COMPILING))
 
 
 def has_foreign_methods() -> bool:
-    """Whether a class of this package has a function that is not from it: somebody has replaced one."""
+    """Whether a class of this package has a function from elsewhere: then somebody has replaced one."""
     for name, module in list(sys.modules.items()):
         if name.partition(".")[0] != OURS or module is None:
             continue
@@ -122,14 +122,14 @@ def has_foreign_methods() -> bool:
 
 
 class NotOurs(Exception):
-    """Something whose code or state this package does not know."""
+    """A value whose code or state this package does not know."""
 
 
 def described(value: Any, traced: bool = False) -> Iterator[str]:
-    """Texts that are the same for all values of which a program is the same.
+    """Texts that are equal for all values that give the same program.
 
     Args:
-      traced: whether leaves are arguments of the program, of which it depends on shapes and types alone.
+      traced: whether leaves are arguments of the program, which depends only on their shapes and types.
 
     Raises:
       NotOurs: for functions, and classes that are not of this package.

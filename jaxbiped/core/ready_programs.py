@@ -1,13 +1,13 @@
 """Compiled programs on disk, found without tracing them: the second process to run a program loads it in milliseconds.
 
-XLA's own cache (`core.program_cache`) is keyed by the lowered program, and to trace and lower one takes seconds. Here
-the key is what a program is traced from: the text of this package, its function, what is static, the shapes and types
+XLA's own cache (`core.program_cache`) is keyed by the lowered program, and tracing and lowering take seconds. Here
+the key is what a program is traced from: the text of this package, its function, static values, the shapes and types
 of its arguments, JAX's settings, the versions of JAX and XLA and the kind of processor. So it is used only where that
-is all: on one device of one process, outside of other traces, where every type of the arguments and everything static
-is of this package or plain, and where nobody has replaced anything in a module or a class of it, or edited its files
-since they were read. Tables that are changed in place are not seen: `JAXBIPED_CACHE=off` then. Programs that call back
-into Python are traced anew, since what they call is known by numbers of one process. `jax.jit` stands in everywhere
-else. A kept program is code that runs: the folder must be the user's own, as it is by default.
+is sufficient: on one device of one process, outside of other traces, if every type of the arguments and everything
+static is from this package or plain, and if nobody has replaced anything in a module or a class of it, or edited its
+files since they were read. Tables that are modified in place are not detected: use `JAXBIPED_CACHE=off` then. Programs
+that call back into Python are traced again, since their functions are identified by numbers of one process. `jax.jit`
+is used in all other cases. A kept program is executable code: the folder must be the user's own, as it is by default.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from jaxbiped.core.program_identity import compile_settings, has_one_device, pro
 
 KIND = b"jaxbiped ready program 1\n"
 
-Target = tuple[str, tuple]  # a module, and what its `registered` is called with
-TARGETS: dict[str, Target] = {}  # by the names that XLA knows kernels by
+Target = tuple[str, tuple]  # a module, and the arguments of its `registered`
+TARGETS: dict[str, Target] = {}  # by the names of kernels in XLA
 CALLED = re.compile(r'custom_call_target="([^"]+)"')
 
 
 def ready_jit(function: Callable | None = None, *, static_argnames: tuple[str, ...] = ()) -> Callable:
-    """Decorator: `jax.jit`, with programs that are kept."""
+    """Decorator: `jax.jit`, with programs kept on disk."""
     if function is None:
         return functools.partial(ready_jit, static_argnames=static_argnames)
     signature = inspect.signature(function)
@@ -52,7 +52,7 @@ def ready_jit(function: Callable | None = None, *, static_argnames: tuple[str, .
     def from_parts(arguments: tuple, static: tuple):
         return function(**dict(zip(traced, arguments, strict=True)), **dict(static))
 
-    from_parts.__name__ = from_parts.__qualname__ = function.__name__  # which names the program
+    from_parts.__name__ = from_parts.__qualname__ = function.__name__  # it names the program
     apart = jax.jit(from_parts, static_argnums=1)
 
     @functools.wraps(function)
@@ -66,7 +66,7 @@ def ready_jit(function: Callable | None = None, *, static_argnames: tuple[str, .
             return jitted(*args, **kwargs)
         try:
             kinds = tuple(map(jax.typeof, leaves))
-        except TypeError:  # numbers of another byte order, say
+        except TypeError:  # for example, numbers of another byte order
             return jitted(*args, **kwargs)
         key = tree, static, tuple(type(value) for _, value in static), kinds, trace_settings(), compile_settings()
         program = programs.get(key)
@@ -86,12 +86,12 @@ def ready(
     lower: Callable[[], jax.stages.Lowered],
     compile: Callable[[jax.stages.Lowered], jax.stages.Compiled] = lambda lowered: lowered.compile(),
 ) -> jax.stages.Compiled:
-    """A compiled program, from the disk where it is kept there, else made, and kept where that may be.
+    """A compiled program, loaded from disk if it is there, else compiled, and kept if possible.
 
     Args:
-      name: of the traced function with all that is not in the other arguments.
-      arguments: positional ones of the program: arrays, or anything with a shape and type.
-      static: all else that the program depends on.
+      name: name of the traced function, with everything that is not in the other arguments.
+      arguments: positional arguments of the program: arrays, or anything with a shape and type.
+      static: everything else that the program depends on.
       lower, compile: make it.
     """
     file = program_file(name, arguments, static)
@@ -106,8 +106,8 @@ def ready(
 
 
 def may_be_ready(leaves: list) -> bool:
-    """Whether arguments are arrays on the one device, or numbers, and nothing of this package was replaced."""
-    if REPLACED:  # whoever did so may want programs traced anew, by `jax.clear_caches`
+    """Whether arguments are arrays on the only device, or numbers, and nothing of this package was replaced."""
+    if REPLACED:  # after that the user may want programs traced again, by `jax.clear_caches`
         return False
     if jax.config.jax_disable_jit or not has_one_device():
         return False
@@ -120,7 +120,7 @@ def may_be_ready(leaves: list) -> bool:
 
 
 def program_file(name: str, arguments: tuple, static: Any) -> Path | None:
-    """Where a program is kept; None for one that is not."""
+    """The file of a program; None if it is not kept."""
     folder = program_folder()
     if folder is None or not jax.config.jax_enable_compilation_cache or jax.config.jax_compilation_cache_dir:
         return None
@@ -129,7 +129,7 @@ def program_file(name: str, arguments: tuple, static: Any) -> Path | None:
 
 
 def load(file: Path, arguments: tuple) -> jax.stages.Compiled | None:
-    """A program that is kept; None where there is none, or it cannot be used."""
+    """A kept program; None if there is none, or it cannot be used."""
     data = kept_files.read(file, KIND)
     if data is None:
         return None
@@ -139,18 +139,18 @@ def load(file: Path, arguments: tuple) -> jax.stages.Compiled | None:
             importlib.import_module(module).registered(*given)
         trees = jax.tree.structure((arguments, {})), jax.tree.structure(skeleton)
         return serialize_executable.deserialize_and_load(payload, *trees)
-    except Exception:  # of whatever kind: it is made anew, and this file replaced
+    except Exception:  # of any kind: the program is compiled again, and this file replaced
         return None
 
 
 def store(file: Path, program: jax.stages.Compiled, kept: bytes | None = None) -> None:
-    """Keep a program, where that is possible.
+    """Keep a program, if possible.
 
     Args:
-      kept: its entry in JAX's cache. One that came from there cannot be written again: XLA leaves out a part.
+      kept: its entry in JAX's cache. One that came from there cannot be written again: XLA omits a part.
     """
     called = set(CALLED.findall(program.as_text() or ""))
-    if not called <= set(TARGETS):  # Python functions, or libraries that are made ready when a program is traced
+    if not called <= set(TARGETS):  # Python functions, or libraries that are initialised when a program is traced
         return
     try:
         tree = program.out_tree
@@ -164,7 +164,7 @@ def store(file: Path, program: jax.stages.Compiled, kept: bytes | None = None) -
 
 
 def written(program: jax.stages.Compiled, kept: bytes | None) -> bytes:
-    """As `serialize_executable.serialize`, from the entry in JAX's cache where there is one."""
+    """As `serialize_executable.serialize`, from the entry in JAX's cache if there is one."""
     if kept is None:
         return serialize_executable.serialize(program)[0]
     code, _ = compilation_cache.extract_executable_and_time(compilation_cache.decompress_executable(kept))

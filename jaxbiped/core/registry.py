@@ -1,7 +1,7 @@
-"""What exists under which name: one list of names for each kind of component.
+"""Names of components: one registry for each kind of component.
 
-Names come from this package, from `register`, and from entry points of other packages; `package.module:name` stands for
-what a module holds, and needs no registration.
+Names come from this package, from `register`, and from entry points of other packages; `package.module:name` refers to
+an object in a module, and needs no registration.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ PLACE = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_]\w*")  # package.module:name
 
 
 class Registry(Generic[T]):
-    """Names and what they stand for, in the order in which they came; that is the order of tables, too.
+    """Names and their entries, in order of registration, which is also the order of tables.
 
     Args:
-      kind: "strategy", say; for messages.
-      group: of entry points.
+      kind: such as "strategy"; for messages.
+      group: group of entry points.
     """
 
     def __init__(self, kind: str, group: str):
@@ -33,10 +33,10 @@ class Registry(Generic[T]):
         self.held: dict[str, T] = {}
 
     def add(self, name: str, thing: T, *, replace: bool = False) -> T:
-        """Give a name to something, and return it.
+        """Register an entry under a name, and return it.
 
         Raises:
-          InputError: a name that is taken by something else, unless it is to be replaced.
+          InputError: a name that belongs to another entry, unless it is to be replaced.
         """
         taken = self.held.get(name)
         if taken is not None and taken is not thing and not replace and not is_equal(taken, thing):
@@ -54,7 +54,7 @@ class Registry(Generic[T]):
         return name in self.held
 
     def names(self) -> tuple[str, ...]:
-        """All names that are registered."""
+        """All registered names."""
         return tuple(self.held)
 
     def knows(self, name: str) -> bool:
@@ -62,13 +62,13 @@ class Registry(Generic[T]):
         return name in self.held or any(point.name == name for point in self.entry_points())
 
     def find(self, name: str, convert: Callable[[object, str], T]) -> T:
-        """What a name stands for.
+        """The entry of a name.
 
         Args:
-          convert: makes an entry of what a module holds, and of the name that it has there.
+          convert: makes an entry from an object in a module and its name there.
 
         Raises:
-          InputError: an unknown name, a module that cannot be imported, or that does not hold such a thing.
+          InputError: an unknown name, a module that cannot be imported, or that does not contain such an object.
         """
         if name in self.held:
             return self.held[name]
@@ -81,20 +81,20 @@ class Registry(Generic[T]):
         raise InputError(f"must be one of {known}, or package.module:name", field=self.kind, value=name)
 
     def offered(self) -> Iterator[str]:
-        """All names that are registered, or those of entry points."""
+        """All names that are registered or those of entry points."""
         yield from self.held
         yield from (point.name for point in self.entry_points())
 
     def entry_points(self) -> Iterator[metadata.EntryPoint]:
-        """What other packages offer."""
+        """The entry points of other packages."""
         yield from metadata.entry_points(group=self.group)
 
 
 def known_name(name: str, built_in: tuple[str, ...], registered: Registry, own: str, also: str = "") -> str:
-    """The name, where it may be that of a component; nothing is read or imported.
+    """The name, if it may be that of a component; nothing is read or imported.
 
     Args:
-      own: what `package.module:name` stands for, in words.
+      own: what `package.module:name` refers to, in words.
       also: what else is allowed, in words.
 
     Raises:
@@ -115,14 +115,14 @@ def is_equal(one: object, other: object) -> bool:
 
 
 STRATEGIES: Registry = Registry("strategy", "jaxbiped.planners")  # filled by `mission.strategies`
-FAMILIES: Registry = Registry("family", "jaxbiped.arenas")  # of arenas that are not built in
+FAMILIES: Registry = Registry("family", "jaxbiped.arenas")  # of user families
 SENSORS: Registry = Registry("sensor", "jaxbiped.sensors")  # filled by `mission.sensors`
 EXECUTORS: Registry = Registry("executor", "jaxbiped.executors")  # filled by `mission.executors`
 METRICS: Registry = Registry("metric", "jaxbiped.metrics")  # filled by `mission.metrics`
 
 
 def load(place: str, kind: str) -> object:
-    """What `package.module:name` stands for; modules are looked for in the working directory, too.
+    """The object at `package.module:name`; modules are also searched in the working directory.
 
     Raises:
       InputError: no such module or name, or a module that raises an error when it is imported.

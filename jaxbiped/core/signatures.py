@@ -1,8 +1,9 @@
-"""Arguments checked by the annotations of a function: what its signature and its dataclasses say is what is allowed.
+"""Arguments checked by the annotations of a function: its signature and its dataclasses define what is allowed.
 
 For public functions that are written for one arena, and that `jax.vmap` maps over more. Rank, shape and dtype are
-checked at every call, also of tracers; they cost nothing in a compiled program. Dynamic axes have letters, as in
-`Float[Array, "H W"]`: one letter is one size in all arguments of a call, and a layout (an argument that has
+checked at every call, also for tracers; the checks cost nothing in a compiled program. Dynamic axes have letters, as in
+`Float[Array, "H W"]`: a letter has one size in all arguments of a call, and a layout (an argument with
+`axis_sizes`) gives the sizes of some of them. `*B` is for batches: here it stands for no axis.
 `axis_sizes`) says what some of them are. `*B` is for batches: in such a function's arguments it stands for no axis.
 """
 
@@ -25,21 +26,21 @@ import numpy as np
 from jaxbiped.core import checks
 from jaxbiped.errors import InputError
 
-Sizes = dict[str, tuple[int, str]]  # of each letter, and the argument that it was first seen in
-ONE = "; the function is of one arena, jax.vmap maps it over more"
+Sizes = dict[str, tuple[int, str]]  # size of each letter, and the argument in which it was first seen
+ONE = "; the function is for one arena, use jax.vmap for more"
 
 
 def checked(*, numbers: tuple[str, ...] = (), late: Mapping[str, str] | None = None) -> Callable[[Callable], Callable]:
     """Decorate a function so that its arguments are checked by their annotations, and are arrays of the right type.
 
-    Real numbers become float32 where they are of another type; nested lists and numbers become arrays.
+    Real numbers of other types become float32; nested lists and numbers become arrays.
 
     Args:
-      numbers: names of arguments in which no NaN is allowed, where values are concrete.
-      late: modules of names in the annotations that the function's own module imports for type checkers alone.
+      numbers: names of arguments in which NaN is not allowed, if values are concrete.
+      late: modules of names in the annotations that the function's own module imports only for type checkers.
 
     Raises:
-      InputError: (the decorated function) about the first argument that is not as it should be.
+      InputError: (the decorated function) about the first invalid argument.
     """
 
     def decorate(function: Callable) -> Callable:
@@ -82,7 +83,7 @@ def is_array_kind(kind: Any) -> bool:
 
 
 def check(name: str, value: Any, kind: Any, sizes: Sizes, nan: bool) -> Any:
-    """One argument, or a part of it, by its annotation."""
+    """Check one argument, or a part of it, by its annotation."""
     origin = typing.get_origin(kind)
     if origin in (types.UnionType, typing.Union):
         return check_any(name, value, typing.get_args(kind), sizes, nan)
@@ -106,18 +107,18 @@ def check(name: str, value: Any, kind: Any, sizes: Sizes, nan: bool) -> Any:
 
 
 def not_a(name: str, value: Any, *kinds: type) -> InputError:
-    """What is raised about an argument that is of none of some classes."""
+    """The error about an argument that is not an instance of any of some classes."""
     return InputError(f"must be {' or '.join(k.__name__ for k in kinds)}, not {type(value).__name__}", field=name)
 
 
 def is_checked(kind: Any) -> bool:
-    """Whether an annotation of a field is of arrays, or of dataclasses with any; others are static and their own."""
+    """Whether an annotation of a field contains arrays, or dataclasses with arrays; other fields are static."""
     members = typing.get_args(kind) or (kind,)
     return any(is_array_kind(member) or dataclasses.is_dataclass(member) for member in members)
 
 
 def check_any(name: str, value: Any, kinds: tuple[Any, ...], sizes: Sizes, nan: bool) -> Any:
-    """A value of one of several annotations; Python's own numbers, where they are among them, stay such numbers."""
+    """A value with one of several annotations; Python's own numbers, if among them, stay as they are."""
     if value is None and type(None) in kinds:
         return None
     kinds = [kind for kind in kinds if kind is not type(None)]
@@ -149,7 +150,7 @@ def check_tuple(name: str, value: Any, kinds: tuple[Any, ...], sizes: Sizes, nan
 
 
 def check_static(name: str, value: Any, kind: type) -> Any:
-    """A number or a switch that decides the program."""
+    """A number or a switch that determines the program."""
     allowed = {bool: (bool, np.bool_), int: (int, np.integer), float: (int, float, np.integer, np.floating)}[kind]
     good = isinstance(value, allowed) and (kind is bool or not isinstance(value, bool))
     if not good or (kind is float and math.isnan(value)):
@@ -183,7 +184,7 @@ def check_array(name: str, value: Any, kind: Any, sizes: Sizes, nan: bool) -> An
 
 
 def allowed_dtype(kind: Any, array: Any) -> tuple[str, bool]:
-    """What an annotation allows, in words, and whether an array is that."""
+    """What an annotation allows, in words, and whether an array complies."""
     names = kind.dtypes if isinstance(kind.dtypes, (tuple, list)) else ()
     if "prng_key" in "".join(map(str, names)):
         return "a random key", jnp.issubdtype(array.dtype, jax.dtypes.prng_key)
@@ -198,9 +199,9 @@ def allowed_dtype(kind: Any, array: Any) -> tuple[str, bool]:
 
 
 def as_wanted(name: str, array: Any, kind: Any, nan: bool) -> Any:
-    """An array of an allowed type as the type that the function computes with."""
+    """An array of an allowed type, converted to the type used by the function."""
     if "float32" in kind.dtypes:
-        with np.errstate(over="ignore"):  # what is too large for a float32 is infinite
+        with np.errstate(over="ignore"):  # values too large for a float32 become infinite
             array = array if array.dtype == np.float32 else array.astype(np.float32)
         if not nan and checks.is_concrete(array) and np.isnan(np.asarray(array)).any():
             raise InputError("must be numbers, not NaN", field=name)

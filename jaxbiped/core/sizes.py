@@ -1,20 +1,20 @@
-"""Sizes that programs are compiled for: few of them, so that studies of many sizes share programs."""
+"""Sizes for which programs are compiled: few of them, so that studies of many sizes share programs."""
 
 from __future__ import annotations
 
 import jax
 import numpy as np
 
-ARENAS, POINTS, JOBS = 16, 8, 64  # no program is of fewer
+ARENAS, POINTS, JOBS = 16, 8, 64  # smallest sizes of programs
 
 
 def filled(count: int, least: int) -> int:
-    """The next power of two from `count` on, at least `least`."""
+    """The next power of two not below `count`, at least `least`."""
     return max(least, 1 << max(count - 1, 0).bit_length())
 
 
 def fill(tree, count: int):
-    """The leaves [n, ...] of a pytree on the host, with their last row again up to `count` rows."""
+    """The leaves [n, ...] of a pytree on the host, padded with their last row to `count` rows."""
 
     def grow(leaf):
         leaf = np.asarray(leaf)

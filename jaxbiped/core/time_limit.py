@@ -12,22 +12,22 @@ from typing import Any
 
 SetAsyncExc = ctypes.pythonapi.PyThreadState_SetAsyncExc
 SetAsyncExc.argtypes, SetAsyncExc.restype = (ctypes.c_ulong, ctypes.py_object), ctypes.c_int
-LOOK = 0.01  # [s] between two looks at who is late
-REST = 1.0  # [s] without a call, after which nobody looks
+LOOK = 0.01  # [s] between two checks for late calls
+REST = 1.0  # [s] without a call, after which the watcher stops
 
 
 class TimeLimit(BaseException):
-    """Code took longer than it may. No `Exception`, so that code which catches all of these does not catch it."""
+    """Code exceeded its time limit. Not an `Exception`, so that code which catches all of these does not catch it."""
 
 
 @dataclass
 class Call:
-    """One call under a limit. Whoever takes the token, the watcher or the call that has ended, decides how it ends.
+    """One call under a limit. Whoever takes the token, the watcher or the completed call, decides how it ends.
 
-    No lock is shared with the watcher: an interrupt might come while it is held, and then nobody would release it.
+    No lock is shared with the watcher: an interrupt might come while it is held, and then it would never be released.
     """
 
-    end: float  # when it is late, on `time.monotonic`
+    end: float  # deadline, on `time.monotonic`
     token: list = field(default_factory=lambda: [None])
     sent: bool = False  # whether it was interrupted
 
@@ -41,7 +41,7 @@ RESTING = [False]
 def within(seconds: float | int, function: Callable, *arguments: Any) -> Any:
     """`function(*arguments)`; limits do not nest.
 
-    Python code is interrupted between two of its instructions, so that a library's compiled code returns first.
+    Python code is interrupted between two of its instructions, so a library's compiled code returns first.
 
     Raises:
       TimeLimit: it took longer.
@@ -59,7 +59,7 @@ def within(seconds: float | int, function: Callable, *arguments: Any) -> Any:
             error = raised
         try:
             call.token.pop()
-        except IndexError:  # it is late, and the interrupt on its way, or swallowed by what was called
+        except IndexError:  # it is late, and the interrupt is pending, or was swallowed by the called code
             while not call.sent:
                 time.sleep(0.0001)
             for _ in range(3):
@@ -75,17 +75,17 @@ def within(seconds: float | int, function: Callable, *arguments: Any) -> Any:
 
 
 def begin_to_watch() -> None:
-    """See that a watcher is awake."""
+    """Make sure that a watcher is running."""
     if not (WATCHER and WATCHER[0].is_alive()):
         thread = threading.Thread(target=watch, daemon=True, name="jaxbiped time limits")
-        WATCHER[:] = [thread]  # two of them, begun at once, do no harm
+        WATCHER[:] = [thread]  # two of them, started at once, do no harm
         thread.start()
     if RESTING[0]:
         WAKE.put(None)
 
 
 def watch() -> None:
-    """Interrupt what takes too long."""
+    """Interrupt calls that exceed their limits."""
     RESTING[0], seen = False, time.monotonic()
     while True:
         now = time.monotonic()

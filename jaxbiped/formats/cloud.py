@@ -18,13 +18,13 @@ from jaxbiped.formats.pcd import read_pcd
 from jaxbiped.formats.ply import read_ply
 
 SUFFIXES = (".npz", ".npy", ".ply", ".pcd")
-AT_ONCE = 1_000_000  # points that are looked at a time
-GREATEST = 1e9  # [m] of a coordinate: beyond, metres are lost even in double precision
+AT_ONCE = 1_000_000  # points processed at a time
+GREATEST = 1e9  # [m] largest coordinate: beyond it, metres are lost even in double precision
 
 
 @dataclass(frozen=True)
 class Cloud:
-    """Points, near to an origin of their own: coordinates far from 0, as of map projections, do not fit float32."""
+    """Points relative to an origin of their own: coordinates far from 0, as in map projections, do not fit float32."""
 
     points: Float32[np.ndarray, "N 3"]  # [m] from the origin; finite
     origin: Float64[np.ndarray, "3"]  # [m]
@@ -32,9 +32,9 @@ class Cloud:
 
 
 def recentred(points: np.ndarray, scale: float = 1.0) -> Cloud:
-    """A cloud of points [N, 3] of any real type, times `scale`; what is not finite is dropped.
+    """A cloud of points [N, 3] of any real type, times `scale`; points that are not finite are dropped.
 
-    The origin is 0 for a cloud that lies within 1 km of it, else its first point in whole metres.
+    The origin is 0 for a cloud within 1 km of it, else its first point in whole metres.
     """
     kept, origin = [], None
     for start in range(0, len(points), AT_ONCE):
@@ -53,10 +53,10 @@ def load(path: str | Path, scale: float = 1.0) -> Cloud:
 
     Args:
       path: .npz with `points` [N, 3] (or `x`, `y`, `z` [N]), .npy [N, 3], .ply (its vertices), .pcd.
-      scale: [m] that one unit of the file is; 0.001 for millimetres.
+      scale: [m] one unit of the file; 0.001 for millimetres.
 
     Raises:
-      InputError: no such file, another suffix, a damaged or empty file, no finite point.
+      InputError: no such file, an unknown suffix, a damaged or empty file, no finite point.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -67,7 +67,7 @@ def load(path: str | Path, scale: float = 1.0) -> Cloud:
         if path.stat().st_size == 0:
             raise InputError("is empty", file=path)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of odd headers of NumPy
+            warnings.simplefilter("ignore")  # about odd NumPy headers
             points = read(path)
     except FileNotFoundError:
         raise InputError("no such file", file=path) from None
@@ -77,8 +77,8 @@ def load(path: str | Path, scale: float = 1.0) -> Cloud:
         raise InputError(f"cannot be read: {reason(error)}", file=path) from None
     except MemoryError:
         raise InputError("is too large for the memory of this machine", file=path) from None
-    except Exception:  # readers raise whatever a damaged file makes them trip over
-        raise InputError(f"is no {suffix} point cloud, or is damaged", file=path) from None
+    except Exception:  # readers raise errors of many types for damaged files
+        raise InputError(f"is not a {suffix} point cloud, or is damaged", file=path) from None
     if points.ndim != 2 or points.shape[1] != 3 or points.dtype.kind not in "iuf":
         got = f"{points.dtype} {list(points.shape)}"
         raise InputError("must hold numbers [N, 3]", file=path, field="points", value=got)
@@ -92,7 +92,7 @@ def load(path: str | Path, scale: float = 1.0) -> Cloud:
 def read_npz(path: Path) -> np.ndarray:
     """`points`, or `x`, `y` and `z`."""
     if not zipfile.is_zipfile(path):
-        raise InputError("is no .npz, or was cut short", file=path)
+        raise InputError("is not an .npz, or is cut short", file=path)
     try:
         with open(path, "rb") as file, np.load(file, allow_pickle=False) as archive:
             if "points" in archive.files:
@@ -101,20 +101,22 @@ def read_npz(path: Path) -> np.ndarray:
                 return np.stack([archive[name].ravel() for name in "xyz"], axis=1)
             names = ", ".join(archive.files) or "nothing"
     except (zipfile.BadZipFile, zlib.error, ValueError, KeyError, EOFError) as error:
-        what = "holds pickled objects, which are refused" if "pickle" in str(error) else "is no .npz, or was cut short"
+        what = (
+            "holds pickled objects, which are rejected" if "pickle" in str(error) else "is not an .npz, or is cut short"
+        )
         raise InputError(what, file=path) from None
     raise InputError(f"must hold points [N, 3], or x, y and z [N]; it holds {names}", file=path)
 
 
 def read_npy(path: Path) -> np.ndarray:
-    """One array, mapped and not read into memory."""
+    """One array, memory-mapped."""
     return np.load(path, mmap_mode="r", allow_pickle=False)
 
 
 def save_ply(
     path: str | Path, points: Float32[np.ndarray, "N 3"], colours: UInt8[np.ndarray, "N 3"] | None = None
 ) -> None:
-    """Write points [m] and their RGB as binary PLY, whole or not at all; raise `InputError` when that fails."""
+    """Write points [m] and their RGB as binary PLY, whole or not at all; raise `InputError` if that fails."""
     import trimesh
 
     stream = io.BytesIO()

@@ -1,18 +1,18 @@
 """Elevation maps as files: `.npz`, grey PNG and TIFF, and Esri's ASCII grid (`.asc`).
 
-Row 0 of an `Elevation` is that of least y. The top row of a picture, and the first of an ASCII grid, is that of
-greatest y, as on a map with north up.
+Row 0 of an `Elevation` has the smallest y. The top row of a picture, and the first of an ASCII grid, has the greatest
+y, as on a map with north up.
 
-- `.npz`: `heights` [P, Q] in metres, row 0 of least y, NaN a hole; `pitch` in metres; and, if it is not at (0, 0),
-  `origin_xy` [2] in metres, the place of `heights[0, 0]`. No other keys.
-- PNG and TIFF of 8 or 16 bits: grey, or colour whose channels are equal. The options `cell` and `range` say how large
-  a pixel is, and which heights the darkest and the brightest value there can be stand for: 0 and 255, or 0 and 65535.
-  Pixels that are not opaque are holes, and so are those of the value `hole`.
+- `.npz`: `heights` [P, Q] in metres, row 0 at the smallest y, NaN for holes; `pitch` in metres; and, unless it is
+  (0, 0), `origin_xy` [2] in metres, the position of `heights[0, 0]`. No other keys.
+- PNG and TIFF of 8 or 16 bits: grey, or colour with equal channels. The options `cell` and `range` give the size of a
+  pixel, and the heights of the darkest and the brightest possible value: 0 and 255, or 0 and 65535. Pixels that are
+  not opaque are holes, and so are those of the value `hole`.
 - TIFF of floating-point numbers: these are heights in metres; `cell` is needed, and there is no `range`.
 - `.asc`: `ncols`, `nrows`, `cellsize` (or equal `dx` and `dy`), `xllcorner` or `xllcenter`, `yllcorner` or
   `yllcenter`, `NODATA_value` (-9999 by default), in any case; then the heights. Other keys are ignored.
 
-Heights below 0 are allowed, and so are holes; what is not finite is one.
+Heights below 0 are allowed, and so are holes; values that are not finite are holes.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ KEYS = ("heights", "pitch", "origin_xy")
 
 @dataclass(frozen=True)
 class Elevation:
-    """Heights on a lattice, on the host; at least 2 x 2, of which two differ."""
+    """Heights on a lattice, on the host; at least 2 x 2, not all equal."""
 
     heights: Float64[np.ndarray, "P Q"]  # [m] row i along y, column j along x; NaN where nothing was measured
-    origin_xy: Float64[np.ndarray, "2"]  # [m] place of heights[0, 0]
-    pitch: float  # [m] from a height to the next
+    origin_xy: Float64[np.ndarray, "2"]  # [m] position of heights[0, 0]
+    pitch: float  # [m] from one height to the next
 
     @property
     def size_xy(self) -> tuple[float, float]:
@@ -55,11 +55,11 @@ class Elevation:
 
     @property
     def holes(self) -> int:
-        """How many heights are unknown."""
+        """Number of unknown heights."""
         return int(np.isnan(self.heights).sum())
 
     def field(self, floor: float = 0.0) -> HeightField:
-        """The same for JAX, with heights above `floor` [m]."""
+        """The same for JAX, with heights relative to `floor` [m]."""
         return HeightField(
             heights=jnp.asarray(self.heights - floor, jnp.float32),
             origin_xy=jnp.asarray(self.origin_xy, jnp.float32),
@@ -76,20 +76,20 @@ def load_elevation(
     scale: float = 1.0,
     prefix: str = "",
 ) -> Elevation:
-    """Read an elevation map by the suffix of its file; see the module for what each holds.
+    """Read an elevation map by the suffix of its file; see the module for the formats.
 
     Args:
       path: the file.
-      cell: [m] a pixel of a picture.
+      cell: [m] size of a pixel of a picture.
       range: [m] heights of the darkest and of the brightest value of a picture of whole numbers.
-      hole: the value of pixels of a picture that were not measured.
+      hole: the value of unmeasured pixels of a picture.
       scale: factor of all three axes, after everything else.
-      prefix: of the names of these options in messages.
+      prefix: prefix of the names of these options in messages.
 
     Raises:
-      InputError: no such file, another suffix, a damaged file, options that are needed or do not belong to this kind of
-        file or are out of range, unequal channels, fewer than 2 x 2 heights, more than `MOST_CELLS`, no height, no two
-        that differ, heights beyond `GREATEST`.
+      InputError: no such file, an unknown suffix, a damaged file, options that are missing, do not apply to this kind
+        of file or are out of range, unequal channels, fewer than 2 x 2 heights, more than `MOST_CELLS`, no height, all
+        heights equal, heights beyond `GREATEST`.
     """
     path = Path(path)
     check_options(cell, range, scale, prefix)
@@ -104,7 +104,9 @@ def load_elevation(
         heights, origin_xy, pitch = (read_npz if suffix == ".npz" else read_asc)(path)
     else:
         if cell is None:
-            raise InputError("is required for a picture: how many metres a pixel is", file=path, field=f"{prefix}cell")
+            raise InputError(
+                "is required for a picture: the size of a pixel in metres", file=path, field=f"{prefix}cell"
+            )
         heights, origin_xy, pitch = read_picture(path, range, hole, prefix), np.zeros(2), cell
     heights = np.where(np.isfinite(heights), heights, np.nan)
     check_heights(heights, path)
@@ -112,7 +114,7 @@ def load_elevation(
 
 
 def save_elevation(elevation: Elevation, path: str | Path) -> None:
-    """Write the `.npz` that `load_elevation` reads, whole or not at all."""
+    """Write an `.npz` for `load_elevation`, whole or not at all."""
     arrays = {name: np.asarray(getattr(elevation, name)) for name in KEYS}
     write_whole(path, lambda file: np.savez_compressed(file, **arrays))
 
@@ -128,11 +130,11 @@ def check_options(cell: float | None, range: tuple[float, float] | None, scale: 
 
 
 def read_npz(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray, "2"], float]:
-    """Heights, place of the first, and pitch."""
-    damaged = InputError("is no .npz, or was cut short", file=path)
+    """Heights, position of the first, and pitch."""
+    damaged = InputError("is not an .npz, or is cut short", file=path)
     try:
         with warnings.catch_warnings(), open(path, "rb") as file:
-            warnings.simplefilter("ignore")  # of odd headers of NumPy
+            warnings.simplefilter("ignore")  # about odd NumPy headers
             with zipfile.ZipFile(file) as archive:
                 names = [name.removesuffix(".npy") for name in archive.namelist()]
                 for name in KEYS[: 2 if "origin_xy" not in names else 3]:
@@ -159,7 +161,7 @@ def read_npz(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray
     except ValueError as error:
         if "pickle" not in str(error) and "Object" not in str(error):
             raise damaged from None
-        raise InputError("holds pickled objects, which are refused", file=path) from None
+        raise InputError("holds pickled objects, which are rejected", file=path) from None
     except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, MemoryError, NotImplementedError, SyntaxError):
         raise damaged from None
     for name, value in values.items():
@@ -174,7 +176,7 @@ def read_npz(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray
 
 
 def header_shape(member: io.BufferedIOBase) -> tuple[int, ...]:
-    """The shape of an array in an `.npy`, of which no more than the header is read."""
+    """The shape of an array in an `.npy`, from its header alone."""
     version = np.lib.format.read_magic(member)
     reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     return reader(member)[0]

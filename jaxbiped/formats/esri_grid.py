@@ -12,12 +12,12 @@ from jaxbiped.errors import InputError
 from jaxbiped.files import read_text
 from jaxbiped.formats.heights import check_shape
 
-NO_DATA = -9999.0  # of a grid that names none
+NO_DATA = -9999.0  # default marker for missing data
 CORNERS = (("xllcorner", "xllcenter"), ("yllcorner", "yllcenter"))
 
 
 def read_asc(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray, "2"], float]:
-    """Heights, place of the first, and pitch."""
+    """Heights, position of the first, and pitch."""
     words = read_text(path, otherwise="latin-1").split()
     header: dict[str, float] = {}
     while len(words) > 2 * len(header) and re.match(r"[A-Za-z_]", key := words[2 * len(header)]):
@@ -60,7 +60,7 @@ def read_asc(path: Path) -> tuple[Float64[np.ndarray, "P Q"], Float64[np.ndarray
 
 
 def is_number(word: str) -> bool:
-    """Whether Python reads a word as a number."""
+    """Whether Python can read a word as a number."""
     try:
         float(word)
     except ValueError:

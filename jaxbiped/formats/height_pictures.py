@@ -49,7 +49,7 @@ def read_picture(
 
 
 def grey_values(path: Path) -> tuple[Float[np.ndarray, "P Q"], Shaped[np.ndarray, "P Q"], int | None]:
-    """Values of a picture, top row first; where it is opaque; and the greatest value there can be, None of reals."""
+    """Values of a picture, top row first; where it is opaque; and the greatest possible value, None for reals."""
     try:
         data = path.read_bytes()
     except FileNotFoundError:
@@ -65,7 +65,7 @@ def grey_values(path: Path) -> tuple[Float[np.ndarray, "P Q"], Shaped[np.ndarray
         raise
     except UnidentifiedImageError:
         raise InputError("is damaged, or a kind of picture that is not supported", file=path) from None
-    except Exception:  # Pillow and OpenCV raise whatever a damaged picture makes them trip over
+    except Exception:  # Pillow and OpenCV raise errors of many types for damaged pictures
         raise InputError("is damaged or cut short", file=path) from None
     full = int(np.iinfo(samples.dtype).max) if samples.dtype.kind == "u" else None
     if samples.dtype.kind not in "uf" or (full or 0) > 65535:
@@ -79,7 +79,7 @@ def grey_values(path: Path) -> tuple[Float[np.ndarray, "P Q"], Shaped[np.ndarray
     unequal = ((samples != first) & ((samples == samples) | (first == first))).any(2) & opaque  # NaN equals NaN
     if unequal.any():
         i, j = np.argwhere(unequal)[0]
-        message = "must be grey: its channels differ, and a colour is no height"
+        message = "must be grey: its channels differ, and a colour is not a height"
         raise InputError(message, file=path, field=f"pixel ({j}, {i})", value=tuple(samples[i, j].tolist()))
     return samples[..., 0].astype(np.float64), opaque, full
 
@@ -99,7 +99,7 @@ def read_deep(data: bytes, path: Path) -> Shaped[np.ndarray, "P Q *C"]:
     """Samples of a picture of more than 8 bits, whose bits OpenCV keeps: grey, or colour and perhaps alpha."""
     colours = None
     if data.startswith(PNG):
-        with Image.open(io.BytesIO(data), formats=("PNG",)) as picture:  # which knows a file that is cut short
+        with Image.open(io.BytesIO(data), formats=("PNG",)) as picture:  # it detects truncated files
             check_shape(picture.height, picture.width, path)
             picture.load()
     else:

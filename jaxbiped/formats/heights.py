@@ -1,4 +1,4 @@
-"""What heights of any file must be."""
+"""Requirements on the heights in any file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from jaxtyping import Float64
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import MOST_CELLS
 
-GREATEST = 1e4  # [m] of a height; what is more is a mark for "no data" that the file does not declare
+GREATEST = 1e4  # [m] largest height; larger values are marks for "no data" that the file does not declare
 
 
 def check_heights(heights: Float64[np.ndarray, "P Q"], path: Path) -> None:
@@ -20,14 +20,14 @@ def check_heights(heights: Float64[np.ndarray, "P Q"], path: Path) -> None:
         message = "must hold heights; all are holes (NaN, no data or transparent)"
         raise InputError(message, file=path, value=f"{heights.size} holes")
     if np.abs(known).max() > GREATEST:
-        message = f"must hold heights within {GREATEST:,.0f} m of 0; a mark for what was not measured must be declared"
+        message = f"must hold heights within {GREATEST:,.0f} m of 0; a mark for unmeasured heights must be declared"
         raise InputError(message, file=path, value=float(known[np.abs(known).argmax()]))
     if known.min() == known.max():
         raise InputError(f"must hold heights that differ; all are {known[0]:g} m", file=path)
 
 
 def check_shape(rows: int, columns: int, path: Path) -> None:
-    """Raise `InputError` about a file with too few or too many heights, before they are unpacked."""
+    """Raise `InputError` about a file with too few or too many heights, before they are decoded."""
     if min(rows, columns) < 2:
         raise InputError("must have at least 2 x 2 heights", file=path, value=f"{rows} x {columns}")
     if rows * columns > MOST_CELLS:

@@ -3,10 +3,10 @@
 Format: Sturtevant, "Benchmarks for Grid-Based Pathfinding", IEEE T-CIAIG 4(2), 2012. A position is (x, y) =
 (column, row), with (0, 0) the upper left character. Row i of the class grid is text row i, and column j its column:
 nothing is flipped, so that cell (i, j) = (y, x); the grid's y axis therefore points down the page, and pictures
-of such a map turn it over.
+of such a map are flipped.
 
 Deviation: water (`W`) is passable in the format, but only from water, and public scenarios hold queries within water
-and even within trees. A robot that walks has no business there: both are obstacles, and such a query has no path.
+and even within trees. A walking robot cannot go there: both are obstacles, and such a query has no path.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ TERRAIN = {
 }
 LARGEST_SIDE = 1 << 16  # [cells]; a header beyond this is damage, not a map
 HEADER = (["type"], ["height"], ["width"])
-HEADER_LINES = 20  # within which the word 'map' stands, after comments and blank lines
+HEADER_LINES = 20  # within which the word 'map' must come, after comments and blank lines
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Scenario:
     start_ij: Int[np.ndarray, "Q 2"]  # row, column: the file's y, x
     goal_ij: Int[np.ndarray, "Q 2"]
     optimal: Float64[np.ndarray, "Q"]  # [cells]
-    tolerance: Float64[np.ndarray, "Q"]  # [cells] how far `optimal` may be from the exact length, by its digits
+    tolerance: Float64[np.ndarray, "Q"]  # [cells] largest error of `optimal`, from its digits
 
 
 def load_map(path: str | Path, pitch: float = 0.05) -> ClassGrid:
@@ -54,7 +54,7 @@ def load_map(path: str | Path, pitch: float = 0.05) -> ClassGrid:
 
     Args:
       path: the file.
-      pitch: [m] side of a cell, above 0; the file does not say, so that a cell is a step of the robot by default.
+      pitch: [m] side of a cell, above 0; not in the file, so that a cell is a step of the robot by default.
 
     Raises:
       InputError: no such file, another type, a bad header, a row or column missing or in excess, an unknown
@@ -98,14 +98,14 @@ def load_scenario(path: str | Path, grid: ClassGrid) -> Scenario:
     """Read a `.scen` file of version 1, or 0, that belongs to the map `grid`.
 
     Raises:
-      InputError: no such file, another version, a line that is cut short or no query, a map of another size, a
-        position outside the map, a negative or infinite length, no query at all.
+      InputError: no such file, another version, a line that is truncated or not a query, a map of another size, a
+        position outside the map, a negative or infinite length, no queries.
     """
     lines = read_lines(path)
     first, *rest = lines or [""]
     words = first.split()
     says = words[:1] == ["version"]
-    if not says:  # files of version 0 do not say so, nor need they say how large their map is
+    if not says:  # files of version 0 do not state it, nor need they state the size of their map
         rest = lines
     elif words[1:] not in (["1"], ["1.0"]):
         raise InputError("must begin with 'version 1'", file=path, field="line 1", value=first)
@@ -126,7 +126,7 @@ def query(
 
     The size of the map may be missing unless it must be `sized`.
     """
-    words = re.split("\t" if "\t" in line else " +", line)  # the map's name may hold any other character
+    words = re.split("\t" if "\t" in line else " +", line)  # the map's name may contain any other character
     if not sized and len(words) == 7:
         words[2:2] = str(shape[1]), str(shape[0])
     allowed = "must hold bucket, map, width, height, start x, start y, goal x, goal y, optimal length"
@@ -139,7 +139,7 @@ def query(
     except ValueError:
         raise InputError(allowed, file=path, field=field, value=line) from None
     if (height, width) != shape:
-        message = f"must be of a map as wide and high as this one, {shape[1]} x {shape[0]}"
+        message = f"must be for a map of the size of this one, {shape[1]} x {shape[0]}"
         raise InputError(message, file=path, field=field, value=f"{width} x {height}")
     for x, y in ((start_x, start_y), (goal_x, goal_y)):
         if not (0 <= x < width and 0 <= y < height):
@@ -150,12 +150,12 @@ def query(
 
 
 def rounding(lengths: Float64[np.ndarray, "Q"], texts: tuple[str, ...]) -> Float64[np.ndarray, "Q"]:
-    """How far each length may be from the exact one, by the digits that its file was written with.
+    """Largest error of each length, from the digits with which its file was written.
 
-    The public files were printed in three ways, which a file shows as a whole and a single number does not ("4" may
-    be any of them): 2 decimals, 6 significant digits with trailing zeros dropped, and 8 decimals. So a length may be
-    off by half a unit of the file's last decimal or of its last significant digit (the sixth at least), whichever is
-    greater, and by the rounding of sums.
+    The public files were printed in three ways, which can be told from a whole file but not from a single number ("4"
+    may be any of them): 2 decimals, 6 significant digits with trailing zeros dropped, and 8 decimals. So a length may
+    have an error of half a unit of the file's last decimal or of its last significant digit (the sixth at least),
+    whichever is greater, plus the rounding of sums.
     """
     decimals = max(len(text.partition(".")[2]) for text in texts)
     significant = max(6, *(len(text.replace(".", "").lstrip("0")) for text in texts))
@@ -173,7 +173,7 @@ def side(text: str | None, path: str | Path, field: str) -> int:
 
 
 def read_lines(path: str | Path) -> list[str]:
-    """The lines of a text file, without spaces and tabs after them and without empty lines at the end of the file."""
+    """The lines of a text file, without trailing spaces and tabs and without empty lines at the end of the file."""
     lines = [line.rstrip(" \t") for line in read_text(path, otherwise="latin-1").split("\n")]
     while lines and not lines[-1]:
         lines.pop()

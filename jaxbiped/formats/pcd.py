@@ -1,7 +1,7 @@
-"""PCD files of the Point Cloud Library: the places of their points.
+"""PCD files of the Point Cloud Library: the positions of their points.
 
-Its own reader takes a missing COUNT for 1, skips fields of COUNT 0, and needs POINTS or WIDTH and HEIGHT, one of both;
-pypcd4, which unpacks the data here, wants each line. So it is given the header anew.
+PCL's own reader takes a missing COUNT as 1, skips fields of COUNT 0, and needs either POINTS or WIDTH and HEIGHT;
+pypcd4, which unpacks the data here, needs each line. So it is given a rewritten header.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def read_pcd(path: Path) -> np.ndarray:
     """x, y and z [N, 3] of all points, in the file's unit.
 
     Raises:
-      InputError: no PCD file, a bad header, no fields x, y and z, or a file that ends too early or is damaged.
+      InputError: not a PCD file, a bad header, no fields x, y and z, or a file that is truncated or damaged.
     """
     data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     fields, points, form, body = read_header(data, path)
@@ -46,11 +46,11 @@ def read_pcd(path: Path) -> np.ndarray:
         return from_ascii(body, fields, points, path)
     record = sum(field.size * field.count for field in fields)
     if form == "binary" and len(body) < points * record:
-        raise InputError(f"was cut short: it holds {len(body) // record} of {points} points", file=path)
+        raise InputError(f"is cut short: it holds {len(body) // record} of {points} points", file=path)
     if form == "binary_compressed" and points:
         packed, unpacked = (int.from_bytes(body[k : k + 4], "little") for k in (0, 4))
         if len(body) < 8 + packed or unpacked != points * record:
-            raise InputError(f"was cut short or is damaged: its data are no {points} points", file=path)
+            raise InputError(f"is cut short or damaged: its data are not {points} points", file=path)
     from pypcd4 import PointCloud
 
     cloud = PointCloud.from_fileobj(io.BytesIO(whole_header(fields, points, form) + body))
@@ -61,7 +61,7 @@ def read_header(data: bytes, path: Path) -> tuple[list[Field], int, str, bytes]:
     """Fields of COUNT 1 or more, the number of points, how they are packed, and their data."""
     end = re.search(rb"(?:^|[\r\n])[ \t]*DATA[ \t]+(\w+)[ \t]*(\r\n|\n|\r|$)", data[:1_000_000])
     if end is None:
-        raise InputError("is no PCD file, or was cut short: its header must end with DATA", file=path)
+        raise InputError("is not a PCD file, or is cut short: its header must end with DATA", file=path)
     form = end[1].decode("latin-1")
     if form not in FORMS:
         raise InputError(f"must be one of {', '.join(FORMS)}", file=path, field="DATA", value=form)
@@ -74,7 +74,7 @@ def read_header(data: bytes, path: Path) -> tuple[list[Field], int, str, bytes]:
     counts = said.get("COUNT", ["1"] * len(names))
     for key, values in (("TYPE", kinds), ("SIZE", sizes), ("COUNT", counts)):
         if len(values) != len(names):
-            raise InputError(f"must say something of each of the {len(names)} fields", file=path, field=key,
+            raise InputError(f"must have a value for each of the {len(names)} fields", file=path, field=key,
                              value=" ".join(values))  # fmt: skip
     fields = []
     for name, kind, size, count in zip(names, kinds, sizes, counts, strict=True):
@@ -88,7 +88,7 @@ def read_header(data: bytes, path: Path) -> tuple[list[Field], int, str, bytes]:
 
 
 def how_many(said: dict[str, list[str]], path: Path) -> int:
-    """The number of points: POINTS, or WIDTH times HEIGHT, which must agree where both are there."""
+    """The number of points: POINTS, or WIDTH times HEIGHT, which must agree if both are present."""
     found = {}
     for key in ("WIDTH", "HEIGHT", "POINTS"):
         if key in said:
@@ -112,16 +112,16 @@ def from_ascii(body: bytes, fields: list[Field], points: int, path: Path) -> np.
         try:
             numbers = np.fromstring(body, np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
-            raise InputError("is damaged: what follows its header must be numbers", file=path) from None
+            raise InputError("is damaged: its header must be followed by numbers", file=path) from None
     if len(numbers) < points * columns:
-        raise InputError(f"was cut short: it holds {len(numbers) // columns} of {points} points", file=path)
+        raise InputError(f"is cut short: it holds {len(numbers) // columns} of {points} points", file=path)
     starts = np.cumsum([0] + [field.count for field in fields])
     names = [field.name for field in fields]
     return numbers[: points * columns].reshape(points, columns)[:, [starts[names.index(name)] for name in "xyz"]]
 
 
 def whole_header(fields: list[Field], points: int, form: str) -> bytes:
-    """A header with each line there is; fields that are not read get names of their own."""
+    """A complete header; fields that are not read get made-up names."""
     names = [field.name if field.name in "xyz" else f"f{k}" for k, field in enumerate(fields)]
     lines = (
         "VERSION 0.7",

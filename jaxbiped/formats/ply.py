@@ -1,8 +1,8 @@
-"""PLY files, of clouds and of meshes: the places of their vertices.
+"""PLY files of clouds and of meshes: the positions of their vertices.
 
-Format: Turk, "The PLY Polygon File Format", 1994. Elements of any kind may stand before and after the vertices,
-properties of any kind beside x, y and z, and lists among them, each as long as it says itself. (trimesh, which writes
-these files here, reads no lists of varying length, and parts and drops vertices of a mesh that has a texture.)
+Format: Turk, "The PLY Polygon File Format", 1994. Elements of any kind may come before and after the vertices,
+properties of any kind beside x, y and z, including lists that state their own length. (trimesh, which writes
+these files here, reads no lists of varying length, and splits and drops vertices of a textured mesh.)
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Property:
     """One number of each record of an element, or a list of them."""
 
     name: str
-    kind: str  # of NumPy, without its byte order
-    length: str | None  # the same of the number before a list, which says its length; None: no list
+    kind: str  # NumPy's, without its byte order
+    length: str | None  # the kind of the number before a list that gives its length; None: not a list
 
 
 @dataclass(frozen=True)
@@ -45,14 +45,14 @@ class Element:
 
 
 class CutShortError(Exception):
-    """The file ends within an element; holds how many whole records of it there are."""
+    """The file ends within an element; holds the number of complete records."""
 
 
 def read_ply(path: Path) -> Float64[np.ndarray, "N 3"]:
     """x, y and z of all vertices, in the file's unit.
 
     Raises:
-      InputError: no PLY file, a bad header, no vertices with x, y and z, or a file that ends too early.
+      InputError: not a PLY file, a bad header, no vertices with x, y and z, or a truncated file.
     """
     data = path.read_bytes().removeprefix(b"\xef\xbb\xbf")
     form, elements, start = read_header(data, path)
@@ -67,20 +67,20 @@ def read_ply(path: Path) -> Float64[np.ndarray, "N 3"]:
             at, table = records(body, at, element, end)
         except CutShortError as error:
             what = "points" if element.name == "vertex" else f"records of {element.name}"
-            raise InputError(f"was cut short: it holds {error} of {element.count} {what}", file=path) from None
+            raise InputError(f"is cut short: it holds {error} of {element.count} {what}", file=path) from None
         if element.name == "vertex" and points is None:
             points = np.stack([table[name].astype(np.float64) for name in "xyz"], axis=1)
     return points
 
 
 def read_header(data: bytes, path: Path) -> tuple[str, list[Element], int]:
-    """Format, elements, and where the data begin."""
+    """Format, elements, and the position where the data begin."""
     if not re.match(rb"ply[ \t]*[\r\n]", data):
-        raise InputError("is no PLY file: it must begin with ply", file=path)
-    line_end = re.search(rb"\r\n|\n|\r", data)[0]  # as the first line ends, so do all: what follows may be binary
+        raise InputError("is not a PLY file: it must begin with ply", file=path)
+    line_end = re.search(rb"\r\n|\n|\r", data)[0]  # all lines end like the first: what follows may be binary
     end = re.search(rb"[\r\n]end_header[ \t]*(" + line_end + rb"|$)", data[:LONGEST_HEADER])
     if end is None:
-        raise InputError("is no PLY file, or was cut short: its header does not end", file=path)
+        raise InputError("is not a PLY file, or is cut short: its header does not end", file=path)
     form, elements = "", []
     for line in data[: end.start()].decode("latin-1").split(line_end.decode())[1:]:
         words = line.split()
@@ -88,14 +88,14 @@ def read_header(data: bytes, path: Path) -> tuple[str, list[Element], int]:
             form = words[1] if len(words) > 1 else ""
         elif words[:1] == ["element"]:
             if len(words) != 3 or not re.fullmatch("[0-9]{1,18}", words[2]):
-                raise InputError("must be a name and how many there are", file=path, field="element", value=line)
+                raise InputError("must be a name and a count", file=path, field="element", value=line)
             elements.append(Element(words[1], int(words[2]), ()))
         elif words[:1] == ["property"]:
             if not elements:
                 raise InputError("must stand below an element", file=path, field="property", value=line)
             last, found = elements.pop(), read_property(words, path, line)
             if found.name in [p.name for p in last.properties]:
-                raise InputError("must be there once", file=path, field="property", value=line)
+                raise InputError("must occur once", file=path, field="property", value=line)
             elements.append(Element(last.name, last.count, (*last.properties, found)))
     if form not in ENDS:
         raise InputError(f"must be one of {', '.join(ENDS)}", file=path, field="format", value=form)
@@ -108,7 +108,7 @@ def read_header(data: bytes, path: Path) -> tuple[str, list[Element], int]:
 
 
 def read_property(words: list[str], path: Path, line: str) -> Property:
-    """One line of a header that begins with property."""
+    """One header line that begins with property."""
     *kinds, name = words[1:] or [""]
     listed = kinds[:1] == ["list"]
     if len(kinds) != (3 if listed else 1) or not set(kinds[listed:]) <= TYPES.keys():
@@ -118,28 +118,28 @@ def read_property(words: list[str], path: Path, line: str) -> Property:
 
 
 def numbers_of(text: bytes, path: Path) -> np.ndarray:
-    """All numbers of the data in ASCII, as bytes of float64, so that they are read as binary data are."""
+    """All numbers of ASCII data, as bytes of float64, so that they can be read like binary data."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
             numbers = np.fromstring(text, np.float64, sep=" ")
         except (DeprecationWarning, ValueError):
-            raise InputError("is damaged: what follows its header must be numbers", file=path) from None
+            raise InputError("is damaged: its header must be followed by numbers", file=path) from None
     return numbers.view(np.uint8)
 
 
 def as_numbers(element: Element) -> Element:
-    """The element of a file in ASCII as it stands in `numbers_of`."""
+    """The element of an ASCII file as represented in `numbers_of`."""
     doubles = tuple(Property(p.name, "f8", p.length and "f8") for p in element.properties)
     return Element(element.name, element.count, doubles)
 
 
 def records(body: np.ndarray, at: int, element: Element, end: str) -> tuple[int, np.ndarray]:
-    """Where the records of an element that begin at byte `at` end; and its numbers that are not lists, by name."""
+    """The end of an element's records that begin at byte `at`; and its numbers that are not lists, by name."""
     lists = [k for k, p in enumerate(element.properties) if p.length is not None]
     if not element.count or not element.properties:
         return at, np.zeros(0, [(p.name, "f8") for p in element.properties if p.length is None])
-    lengths = first_lengths(body, at, element, end)  # most often all are as long as the first
+    lengths = first_lengths(body, at, element, end)  # usually all are as long as the first
     kind, sizes = record_type(element, lengths, end)
     whole = (len(body) - at) // kind.itemsize
     if whole >= element.count:
@@ -152,7 +152,7 @@ def records(body: np.ndarray, at: int, element: Element, end: str) -> tuple[int,
 
 
 def record_type(element: Element, lengths: dict[int, int], end: str) -> tuple[np.dtype, dict[int, str]]:
-    """The type of records whose lists are so long, and the names of what says their lengths."""
+    """The type of records with lists of these lengths, and the names of the numbers that give the lengths."""
     fields, sizes = [], {}
     for k, p in enumerate(element.properties):
         if p.length is not None:
@@ -164,7 +164,7 @@ def record_type(element: Element, lengths: dict[int, int], end: str) -> tuple[np
 
 
 def first_lengths(body: np.ndarray, at: int, element: Element, end: str) -> dict[int, int]:
-    """How long the lists of the record at byte `at` are."""
+    """The lengths of the lists in the record at byte `at`."""
     lengths = {}
     for k, p in enumerate(element.properties):
         if p.length is not None:
@@ -176,7 +176,7 @@ def first_lengths(body: np.ndarray, at: int, element: Element, end: str) -> dict
 
 
 def number_at(body: np.ndarray, at: int, kind: str) -> int:
-    """The length of a list that stands at byte `at`."""
+    """The length of the list at byte `at`."""
     size = np.dtype(kind).itemsize
     length = float(body[at : at + size].view(kind)[0]) if at + size <= len(body) else -1.0
     if not (0 <= length <= len(body) and length == int(length)):
@@ -185,7 +185,7 @@ def number_at(body: np.ndarray, at: int, kind: str) -> int:
 
 
 def walk(body: np.ndarray, at: int, element: Element, end: str) -> tuple[int, np.ndarray]:
-    """As `records`, of lists of varying length, one record after the other."""
+    """As `records`, for lists of varying length, one record after another."""
     plain = [p for p in element.properties if p.length is None]
     kind = np.dtype([(p.name, end + p.kind) for p in plain])
     kept = np.zeros((element.count if element.count <= len(body) else 0, kind.itemsize), np.uint8)

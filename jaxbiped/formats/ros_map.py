@@ -2,17 +2,17 @@
 
 Rules (wiki.ros.org/map_server, "Map format"): a pixel of grey x in 0..255 is occupied with p = (255 - x) / 255, or
 p = x / 255 when `negate` is set. It is an obstacle where p > occupied_thresh, floor where p < free_thresh, and
-unmeasured between them. The picture's top row is the one of greatest y, a class grid's row 0 the one of least y: the
-rows are turned over.
+unmeasured between them. The picture's top row has the greatest y, a class grid's row 0 the smallest: the rows are
+flipped.
 
-Modes: `trinary` is the rule above. `scale` grades what lies between the thresholds and takes a pixel that is not
+Modes: `trinary` is the rule above. `scale` grades values between the thresholds and treats a pixel that is not
 opaque as unknown; a class has no grades, so both are unmeasured. `raw` takes the pixel itself (after `negate`) as an
 occupancy in percent, unknown above 100; the thresholds then apply to it.
 
-The origin is the pose of the lower left corner; with a yaw the grid lies turned about it (`ClassGrid.yaw`). Keys that
-`map_server` does not know, such as `map_type` and `frame_id`, are ignored as it ignores them.
+The origin is the pose of the lower left corner; with a yaw the grid is rotated about it (`ClassGrid.yaw`). Keys that
+`map_server` does not know, such as `map_type` and `frame_id`, are ignored, as in `map_server`.
 
-Deviations: colour pictures are refused (`map_server` averages the channels: a photograph would become a map). Alpha
+Deviations: colour pictures are rejected (`map_server` averages the channels: a photograph would become a map). Alpha
 matters in `scale` only, as documented (the code of `map_server` averages it into the grey of the other modes).
 """
 
@@ -39,7 +39,7 @@ from jaxbiped.mapping.grid import Cell
 Fraction = Annotated[float, Field(ge=0, le=1)]
 PICTURES = (".png", ".pgm")
 SHEETS = (".yaml", ".yml")
-LEAST_TURN = 1e-3  # [cells] at the far end of the map; less is the rounding of whoever computed the yaw
+LEAST_TURN = 1e-3  # [cells] at the far end of the map; less is attributed to rounding of the yaw
 ORIENTATION = 0x0112  # the EXIF tag
 
 
@@ -49,9 +49,9 @@ class RosMap(Model):
     model_config = pydantic.ConfigDict(extra="ignore")
 
     image: str
-    """The picture, absolute or from the YAML file's folder."""
+    """The picture; a relative path starts at the YAML file's folder."""
     resolution: Annotated[float, Field(gt=0)]
-    """[m] side of a pixel."""
+    """[m] Side of a pixel."""
     origin: tuple[float, float, float]
     """[m, m, rad] x, y of the lower left corner, and yaw."""
     negate: bool
@@ -77,7 +77,7 @@ def load(path: str | Path) -> ClassGrid:
 
     Raises:
       InputError: no such file, no YAML beside the picture, missing keys, values out of range, a picture that
-        is cut short, damaged, empty, in colour, of more than 8 bits or neither PNG nor PGM.
+        is truncated, damaged, empty, in colour, of more than 8 bits or neither PNG nor PGM.
     """
     path = Path(path)
     sheet = path if path.suffix.lower() in SHEETS else sheet_beside(path)
@@ -97,7 +97,7 @@ def classify(
 
     Args:
       grey: 0 (black) to 255 (white).
-      opaque: whether alpha is full.
+      opaque: whether the pixel is fully opaque.
       fields: thresholds and mode.
     """
     grey = grey.astype(float)
@@ -115,7 +115,7 @@ def classify(
 
 
 def read_picture(path: Path) -> tuple[UInt8[np.ndarray, "H W"], Bool[np.ndarray, "H W"]]:
-    """Grey values of a PNG or PGM, and where it is opaque; raise `InputError` when it is no map."""
+    """Grey values of a PNG or PGM, and where it is opaque; raise `InputError` if it is not a map."""
     try:
         data = path.read_bytes()
         with no_chatter(), Image.open(io.BytesIO(data), formats=("PNG", "PPM")) as image:
@@ -127,23 +127,23 @@ def read_picture(path: Path) -> tuple[UInt8[np.ndarray, "H W"], Bool[np.ndarray,
         raise InputError("no such picture", file=path) from None
     except UnidentifiedImageError:
         raise InputError("must be a PNG or PGM picture", file=path) from None
-    except Exception as error:  # Pillow raises whatever a damaged picture makes it trip over
+    except Exception as error:  # Pillow raises errors of many types for damaged pictures
         if isinstance(error, OSError) and error.errno:
             raise InputError(f"cannot be read: {reason(error)}", file=path) from None
         raise InputError("is damaged or cut short", file=path) from None
     if deep:
-        raise InputError("must have 8 bits a pixel and channel, and this picture has more", file=path)
+        raise InputError("must have 8 bits per pixel and channel, but this picture has more", file=path)
     if turned != 1:
         message = "must be upright as it is stored: map_server does not turn pictures by their EXIF orientation"
         raise InputError(message, file=path, value=turned)
     red, green, blue, alpha = np.moveaxis(np.asarray(picture), -1, 0)
     if not (np.array_equal(red, green) and np.array_equal(red, blue)):
-        raise InputError("must be a grey map, and this picture is in colour", file=path)
+        raise InputError("must be a grey map, but this picture is in colour", file=path)
     return red, alpha == 255
 
 
 def read_fields(path: Path) -> dict[str, object]:
-    """The mapping that a YAML file holds; raise `InputError` when it holds none."""
+    """The mapping in a YAML file; raise `InputError` if there is none."""
     data = read_yaml(path)
     if not isinstance(data, dict):
         raise InputError("must hold the fields of a map_server map (image, resolution, origin, ...)", file=path)
@@ -158,5 +158,5 @@ def sheet_beside(picture: Path) -> Path:
         sheet = picture.with_suffix(suffix)
         if sheet.exists():
             return sheet
-    message = f"is no map: the map_server file {picture.with_suffix('.yaml').name} must lie beside it"
+    message = f"is not a map: the map_server file {picture.with_suffix('.yaml').name} must be beside it"
     raise InputError(message, file=picture)

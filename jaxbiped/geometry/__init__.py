@@ -1,4 +1,4 @@
-"""Poses in the plane, upright boxes and height fields, and rays that meet them."""
+"""Poses in the plane, upright boxes and height fields, and ray casting."""
 
 from jaxbiped.core.lazy_loading import lazy_package
 

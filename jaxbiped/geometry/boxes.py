@@ -25,7 +25,7 @@ class Boxes:
     half_y: Float[Array, "*B M"]  # [m] half size along the box's own y
     bottom: Float[Array, "*B M"]  # [m] height of the underside; 0 for a box that stands on the floor
     top: Float[Array, "*B M"]  # [m] height of the top
-    overhead: Bool[Array, "*B M"]  # hangs above the floor: part of the ceiling, not of the ground
+    overhead: Bool[Array, "*B M"]  # whether it hangs above the floor: part of the ceiling, not of the ground
     contrast: Float[Array, "*B M"]  # texture contrast, 0 (plain) to 1 (rich)
     used: Bool[Array, "*B M"]
 

@@ -1,7 +1,7 @@
-"""Ground as heights on a square lattice: the height at points, and where rays first meet the surface.
+"""Ground as heights on a square lattice: the height at points, and first hits of rays on the surface.
 
-The surface is that of MuJoCo's height fields: between four vertices lie two triangles, which meet along the diagonal
-from the corner of least x and y to that of greatest. Below the surface all is solid, so that its rim is a wall.
+The surface is that of MuJoCo's height fields: between four vertices there are two triangles that share the diagonal
+from the corner of smallest x and y to that of greatest. Everything below the surface is solid, so its rim is a wall.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.errors import InputError
 
-SLACK = 1e-3  # [m] above the highest and below the lowest vertex, where the walk of a ray begins and ends
-PARALLEL = 1e-9  # [1/m] a ray that crosses fewer lines of the lattice a metre crosses none: in float32, 0 is reached
+SLACK = 1e-3  # [m] margin above the highest and below the lowest vertex, where the walk of a ray begins and ends
+PARALLEL = 1e-9  # [1/m] a ray that crosses fewer lattice lines per metre crosses none: in float32, 0 is reached
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class HeightField:
-    """Heights at the vertices of a lattice; vertex (i, j) stands at `origin_xy` + `pitch` (j, i). NaN is a hole.
+    """Heights at the vertices of a lattice; vertex (i, j) is at `origin_xy` + `pitch` (j, i). NaN is a hole.
 
-    A triangle of which a vertex is a hole is one, too. There are at least 2 x 2 vertices.
+    A triangle with a vertex in a hole is a hole, too. There are at least 2 x 2 vertices.
     """
 
     heights: Float[Array, "*B P Q"]  # [m] row i along y, column j along x
-    origin_xy: Float[Array, "*B 2"]  # [m] where vertex (0, 0) stands
-    pitch: Float[Array, "*B"]  # [m] from a vertex to the next
+    origin_xy: Float[Array, "*B 2"]  # [m] position of vertex (0, 0)
+    pitch: Float[Array, "*B"]  # [m] from one vertex to the next
 
 
 def on_field(field: HeightField, x: Float[Array, "*S"], y: Float[Array, "*S"]) -> Bool[Array, "*S"]:
-    """Whether points (x, y) [m] lie on the rectangle of one field, its rim included; a hole is part of that."""
+    """Whether points (x, y) [m] lie on the rectangle of one field, including its rim and its holes."""
     u, v = on_lattice(field, x, y)
     rows, columns = shape_of(field)
     return (u >= 0) & (u <= columns - 1) & (v >= 0) & (v <= rows - 1)
@@ -42,7 +42,7 @@ def on_field(field: HeightField, x: Float[Array, "*S"], y: Float[Array, "*S"]) -
 def surface_height(field: HeightField, x: Float[Array, "*S"], y: Float[Array, "*S"]) -> Float[Array, "*S"]:
     """Height [m] of one field at points (x, y) [m]; NaN in a hole, off the rectangle, and where a point is NaN.
 
-    `grad` gives the slope of the triangle, and holds for the heights, too.
+    `grad` gives the slope of the triangle, and also works for the heights.
     """
     u, v = on_lattice(field, x, y)
     rows, columns = shape_of(field)
@@ -59,22 +59,22 @@ def cast_rays(
     direction: Float[Array, "... 3"],
     reach: Float[Array, ""] | float = jnp.inf,
 ) -> Float[Array, "..."]:
-    """How far along each ray, in lengths of its direction, it first meets one field; inf where it never does.
+    """Distance along each ray, in lengths of its direction, to its first hit on one field; inf if there is none.
 
-    Exact: each ray walks from cell to cell, and in each triangle the point is found where the ray's height over the
-    surface, which is linear there, becomes 0. So a ray neither leaks between two triangles nor skips a thin peak. It
+    Exact: each ray walks from cell to cell, and in each triangle the hit is where the ray's height above the surface,
+    which is linear there, becomes 0. So a ray neither leaks between two triangles nor skips a thin peak. It
     walks through at most as many cells as a straight line can cross, P + Q - 3.
 
-    A ray meets the surface from above and from below, and the solid below it at the rim and at the borders of holes;
-    through a hole it passes. From within the solid it is met where the ray comes out through the surface. An origin on
-    the surface meets it at 0. Directions that are 0, and whatever is not finite, meet nothing.
+    A ray hits the surface from above and from below, and the solid below it at the rim and at the borders of holes;
+    it passes through holes. From within the solid it hits where it leaves through the surface. An origin on
+    the surface gives 0. Directions that are 0, and values that are not finite, hit nothing.
 
-    The walk is a `while_loop`: for derivatives by `grad`, use `surface_height`; forward ones (`jvp`) hold.
+    The walk is a `while_loop`: for derivatives by `grad`, use `surface_height`; forward ones (`jvp`) work.
 
     Args:
       origin: [m]; broadcast against `direction`.
       direction: of any length.
-      reach: [lengths of the direction] what lies beyond is not met.
+      reach: [lengths of the direction] hits beyond this are ignored.
     """
     rows, columns = shape_of(field)
     origin, direction = jnp.broadcast_arrays(origin, direction)
@@ -100,12 +100,12 @@ def cast_rays(
     sinks, rises = dz < -PARALLEL, dz > PARALLEL
     into = jnp.where(sinks, (top - z) / dz, jnp.where(~rises & (z > top), jnp.inf, -jnp.inf))
     start = jnp.maximum(jnp.maximum(rim, into), 0.0)
-    # A ray that is below the lowest vertex where it comes to the rim meets that: it ends there, and not before.
+    # A ray below the lowest vertex at the rim hits the rim: it ends there, and not before.
     last = jnp.where(sinks, jnp.maximum((bottom - z) / dz, start), jnp.where(rises, (top - z) / dz, jnp.inf))
     last = jnp.minimum(jnp.minimum(leave, last), reach * length)
     walks = good & (start <= last) & (start < jnp.inf)
 
-    # From here on the ray begins where it enters: what is far off costs no digits within the field.
+    # From here on the ray begins where it enters: a distant origin costs no precision within the field.
     begin = jnp.where(walks, start, 0.0)
     u, v, z = jnp.clip(u + du * begin, 0, columns - 1), jnp.clip(v + dv * begin, 0, rows - 1), z + dz * begin
     ray = Ray(u, v, z, du, dv, dz, jnp.where(walks, last - begin, 0.0))
@@ -146,20 +146,20 @@ class Ray:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Walk:
-    """How far rays have come."""
+    """The progress of rays."""
 
-    i: Int[Array, "R"]  # the cell that each is in
+    i: Int[Array, "R"]  # the current cell of each
     j: Int[Array, "R"]
-    at: Float[Array, "R"]  # [m] where it entered that
-    over: Float[Array, "R"]  # [m] its height over the surface there; NaN where there was none before
-    empty: Bool[Array, "R"]  # what it came from was no solid: it is outside, or in a hole
-    met: Float[Array, "R"]  # [m] where it met the surface; inf: not yet
+    at: Float[Array, "R"]  # [m] where it entered the cell
+    over: Float[Array, "R"]  # [m] its height above the surface there; NaN if there was none before
+    empty: Bool[Array, "R"]  # whether it did not come from solid: it is outside, or in a hole
+    met: Float[Array, "R"]  # [m] where it hit the surface; inf: not yet
     walks: Bool[Array, "R"]
     steps: Int[Array, ""]
 
 
 def next_cell(walk: Walk, ray: Ray, squares: Float[Array, "C 4"], shape: tuple[int, int]) -> Walk:
-    """Each ray one cell further: through one of its triangles or both."""
+    """Advance each ray by one cell: through one of its triangles or both."""
     rows, columns = shape
     corners = tuple(jnp.moveaxis(squares[walk.i * (columns - 1) + walk.j], -1, 0))
     cross_u, cross_v = crossing(ray.u, ray.du, walk.j), crossing(ray.v, ray.dv, walk.i)
@@ -190,7 +190,7 @@ def next_cell(walk: Walk, ray: Ray, squares: Float[Array, "C 4"], shape: tuple[i
         there = jnp.where(jnp.isfinite(here), there, jnp.nan)
         solid = jnp.isfinite(there)
         comes = jnp.isnan(over)
-        # The height at an edge is that of the triangle before: between two values of one edge nothing can leak.
+        # The height at an edge is that of the previous triangle: with one value per edge nothing can leak.
         here = jnp.where(comes, here, over)
         wall = solid & comes & empty & (here < 0)
         through = solid & (((here >= 0) & (there <= 0)) | ((here <= 0) & (there >= 0)))
@@ -214,7 +214,7 @@ def crossing(place: Float[Array, "R"], rate: Float[Array, "R"], cell: Int[Array,
 
 
 def slab(place: Float[Array, "R"], rate: Float[Array, "R"], size: int) -> tuple[Float[Array, "R"], Float[Array, "R"]]:
-    """Where rays enter and leave the range [0, size] of one axis; from inf to -inf where they never are in it."""
+    """Where rays enter and leave the range [0, size] of one axis; from inf to -inf if they are never in it."""
     moves = jnp.abs(rate) > PARALLEL
     rate = jnp.where(moves, rate, 1.0)
     ends = (0 - place) / rate, (size - place) / rate
@@ -233,8 +233,8 @@ def triangle_height(
 
     Args:
       corners: heights [m] at (0, 0), (1, 0), (0, 1) and (1, 1), as (x, y) within the cell.
-      along, across: place within the cell, 0 to 1 along x and y.
-      lower: the triangle of least y, that of (1, 0); else that of (0, 1).
+      along, across: position within the cell, 0 to 1 along x and y.
+      lower: whether the triangle of smallest y, with (1, 0), else that with (0, 1).
     """
     low, right, up, high = corners
     return low + jnp.where(
@@ -243,7 +243,7 @@ def triangle_height(
 
 
 def height_range(field: HeightField) -> tuple[float, float]:
-    """Lowest and highest vertex [m] of a field, on the host; 0 where all are holes. Its heights are concrete."""
+    """Lowest and highest vertex [m] of a field, on the host; 0 if all are holes. Its heights are concrete."""
     heights = np.asarray(field.heights)
     known = heights[np.isfinite(heights)]
     return (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
@@ -257,7 +257,7 @@ def on_lattice(
 
 
 def cell_of(place: Float[Array, "*S"], vertices: int) -> Int[Array, "*S"]:
-    """Index of the cell of a place on an axis; the last one holds both of its ends."""
+    """Index of the cell of a position on an axis; the last one includes both of its ends."""
     return jnp.clip(jnp.floor(place), 0, vertices - 2).astype(jnp.int32)
 
 

@@ -1,4 +1,4 @@
-"""Planar poses: where the robot stands.
+"""Planar poses of the robot.
 
 World frame: x along the arena's long side, y to the left of it, z up, in metres. Robot frame: origin
 on the supporting surface under the robot's vertical axis, x forward, y left, z up. Yaw is
@@ -26,7 +26,7 @@ class Pose:
 
 
 def wrap_angle(angle: Float[Array, "*B"]) -> Float[Array, "*B"]:
-    """`angle` [rad] brought to (-pi, pi]."""
+    """`angle` [rad] wrapped to (-pi, pi]."""
     return -(jnp.mod(-angle + jnp.pi, 2 * jnp.pi) - jnp.pi)
 
 

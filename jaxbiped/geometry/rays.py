@@ -1,9 +1,9 @@
-"""Where rays first meet boxes: the kernel of the depth camera and of everything that asks what hides what.
+"""First hits of rays on boxes: the kernel of the depth camera and of all occlusion tests.
 
-All is done in nearness, the inverse of a ray's parameter. Along a ray origin + t direction the nearness of a plane is
-linear in the direction, so that there are no divisions, and the nearest hit is the greatest. Rays are those of a
+Everything is computed in nearness, the inverse of a ray's parameter. Along a ray origin + t direction the nearness of a
+plane is linear in the direction, so there are no divisions, and the nearest hit is the greatest. Rays are those of a
 pinhole: direction = basis @ (x, y, 1), with the parameter t the depth. They are a structure of arrays, which
-compilers turn into long vectors; boxes come one after the other.
+compilers turn into long vectors; boxes come one after another.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from jaxbiped.geometry.boxes import Boxes
 
 Rays = Float[Array, "R"] | Float[np.ndarray, "R"]
 
-INSIDE = 1e9  # [1/m] nearness of a box that the origin is inside of
+INSIDE = 1e9  # [1/m] nearness of a box that contains the origin
 
 
 def cast_boxes(
@@ -33,12 +33,12 @@ def cast_boxes(
 
     Args:
       boxes: `M` slots of one arena; unused ones may hold anything.
-      marks: one bit about each box, to be known of the box that is hit.
-      origin: of all rays [m], world frame.
+      marks: one bit for each box, returned for the box that is hit.
+      origin: common origin of the rays [m], world frame.
       basis: takes directions (x, y, 1) to the world frame.
       x: first component of each ray.
       y: second component of each ray.
-      background: key of what each ray meets behind the boxes (see `key`); 0 for nothing.
+      background: key of what each ray hits behind the boxes (see `key`); 0 for nothing.
 
     Returns:
       the key of the nearest hit; its nearness is `INSIDE` from within a box. NaN in the origin or basis hits nothing.
@@ -52,8 +52,8 @@ def cast_boxes(
     low, high = 1 / (centre - half), 1 / (centre + half)  # nearness of the two faces, for a direction of 1
     outside = jnp.abs(centre) > half
     near, far = jnp.where(centre > 0, low, high), jnp.where(centre > 0, high, low)
-    # From outside a slab a ray enters by the near face and leaves by the far one; from inside it leaves by either.
-    # A box that is not in use, or of which any number is NaN, is entered at minus infinity: never.
+    # From outside a slab a ray enters by the near face and leaves by the far one; from inside it leaves by one of them.
+    # A box that is not in use, or that has a NaN, is entered at minus infinity: never.
     usable = (boxes.used & jnp.isfinite(jnp.sum(centre, 1) + jnp.sum(half, 1) + jnp.sum(rows, (1, 2))))[:, None]
     rows = jnp.where(usable[..., None], rows, 0.0)
     enter_gain = jnp.where(usable & outside, near, 0.0)
@@ -72,12 +72,12 @@ def cast_boxes(
             leave = greatest(leave, greatest(along * leave_low[axis], along * leave_high[axis]))
         return jnp.maximum(found, key(jnp.where(enter >= leave, enter, 0.0), mark)), None
 
-    # A loop, since its state is kept in memory: unrolled, XLA casts anew for each of the many uses of the result.
+    # A loop keeps its state in memory: unrolled, XLA would repeat the casting for each of the many uses of the result.
     return jax.lax.scan(cast_box, background, (rows, enter_gain, enter_base, leave_gain, marks))[0]
 
 
 def least(a: Rays, b: Rays) -> Rays:
-    """Minimum as one machine instruction: `jnp.minimum` also carries NaN along, which takes three."""
+    """Minimum as one machine instruction: `jnp.minimum` also propagates NaN, which takes three."""
     return jnp.where(b < a, b, a)
 
 
@@ -100,9 +100,9 @@ def cast_floor(
 
 
 def key(nearness: Float[Array, "*R"], mark: Bool[Array, ""]) -> Int32[Array, "*R"]:
-    """Nearness and a mark in one number, so that one maximum finds the nearest hit and what belongs to it.
+    """Nearness and a mark in one number, so that a single maximum finds the nearest hit and its mark.
 
-    Bits of a non-negative float32 order as the float does. The mark takes the lowest one: a relative error of 1e-7.
+    Bits of a non-negative float32 order like the float. The mark takes the lowest bit: a relative error of 1e-7.
     """
     bits = jax.lax.bitcast_convert_type(nearness.astype(jnp.float32), jnp.int32)
     return (bits & ~1) | mark.astype(jnp.int32)
@@ -114,5 +114,5 @@ def nearness(keys: Int32[Array, "*R"]) -> Float[Array, "*R"]:
 
 
 def marked(keys: Int32[Array, "*R"]) -> Bool[Array, "*R"]:
-    """The mark in `keys`; of no meaning where the nearness is 0."""
+    """The mark in `keys`; meaningless where the nearness is 0."""
     return (keys & 1) > 0

@@ -7,10 +7,10 @@ from jaxtyping import Array, Float
 
 
 def matrix(rows: tuple[tuple[Float[Array, ""], ...], ...]) -> Float[Array, "rows columns"]:
-    """A matrix of its elements."""
+    """A matrix from its elements."""
     return jnp.stack([jnp.stack(row) for row in rows])
 
 
 def product(a: Float[Array, "m k"], b: Float[Array, "k n"]) -> Float[Array, "m n"]:
-    """Matrix product in full float32 on any device, as sums: many tiny ones are slow as calls of a library."""
+    """Matrix product in full float32 on any device, as sums: many tiny products are slow as library calls."""
     return jnp.sum(a[:, :, None] * b[None, :, :], axis=1)

@@ -1,4 +1,4 @@
-"""Where the robot believes it stands: the extended Kalman filter, and scan matching."""
+"""The robot's believed pose: the extended Kalman filter, and scan matching."""
 
 from jaxbiped.core.lazy_loading import lazy_package
 

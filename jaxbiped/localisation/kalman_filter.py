@@ -1,8 +1,8 @@
-"""Where the robot believes it stands: an iterated extended Kalman filter over (x, y, yaw), shared by all sensors.
+"""The robot's believed pose: an iterated extended Kalman filter over (x, y, yaw), shared by all sensors.
 
-Odometry predicts, landmarks of known place correct (paper, 2.1). Each landmark seen is one observation of two numbers,
-so that a single one, which fixes no pose by itself, still counts. Without landmarks (not in the paper, which names it
-as future work) two pictures tell of the motion between them, and what a map holds of the pose itself.
+Odometry predicts, landmarks of known position correct (paper, 2.1). Each landmark seen is one observation of two
+numbers, so a single one, which does not determine a pose, still counts. Without landmarks (which the paper names as
+future work) two pictures give the motion between them, and a map gives the pose itself.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.geometry.small import matrix, product
 from jaxbiped.sensing.view import Motion, Sightings
 
-GATE = 18.4  # squared Mahalanobis distance with two degrees of freedom: one good sighting in 10,000 is refused
-GATE_POSE = 21.1  # the same with three
-ROUNDS = 3  # of linearising
-LEAST_VARIANCE = 1e-8  # [m^2, rad^2] of what is measured: keeps the innovation invertible in float32
+GATE = 18.4  # squared Mahalanobis distance with two degrees of freedom: one good sighting in 10,000 is rejected
+GATE_POSE = 21.1  # the same with three degrees of freedom
+ROUNDS = 3  # rounds of linearisation
+LEAST_VARIANCE = 1e-8  # [m^2, rad^2] of measurements: keeps the innovation invertible in float32
 
 
 @jax.tree_util.register_dataclass
@@ -50,13 +50,13 @@ def predict(
     dyaw: Float[Array, ""],
     variances: Float[Array, "3"],
 ) -> Belief:
-    """The belief after a displacement (dx, dy, dyaw) in the robot frame before it, as odometry tells it.
+    """The belief after a displacement (dx, dy, dyaw) in the robot frame before it, according to odometry.
 
-    `variances` [m^2, m^2, rad^2] are those of the displacement's own error, in that frame.
+    `variances` [m^2, m^2, rad^2] are those of the displacement's error, in that frame.
 
     Raises:
       InputError: an argument of another rank, shape or type, a displacement that is not finite, or variances that are
-        not 0 or more. (Under `jit` such a belief is no belief: NaN in it stays.)
+        not 0 or more. (Under `jit` NaN stays in such a belief.)
     """
     for name, value in (("dx", dx), ("dy", dy), ("dyaw", dyaw)):
         finite(name, value)
@@ -68,7 +68,7 @@ def predict(
 def displaced(
     pose: Pose, dx: Float[Array, ""], dy: Float[Array, ""], dyaw: Float[Array, ""]
 ) -> tuple[Pose, Float[Array, "3 3"], Float[Array, "3 3"]]:
-    """A pose after a displacement in its own frame, and how errors of the pose and of the displacement carry over."""
+    """A pose after a displacement in its own frame, and the Jacobians of the errors of pose and displacement."""
     x, y = to_world(pose, dx, dy)
     cos, sin, zero, one = jnp.cos(pose.yaw), jnp.sin(pose.yaw), jnp.zeros_like(pose.yaw), jnp.ones_like(pose.yaw)
     F = matrix(((one, zero, pose.y - y), (zero, one, x - pose.x), (zero, zero, one)))
@@ -80,10 +80,11 @@ def displaced(
 def predict_seen(
     belief: Belief, moved: Float[Array, "3"], variances: Float[Array, "3"], motion: Motion
 ) -> tuple[Belief, Bool[Array, ""]]:
-    """As `predict`, where two pictures have told of the same displacement too; and whether that was believed.
+    """As `predict`, if two pictures measured the same displacement too; also whether that was accepted.
 
-    Two measurements of one displacement, of independent errors: the mean weighted by their covariances. A motion that
-    disagrees with odometry by more than `GATE_POSE`, was not seen, or is not finite, changes nothing.
+    These are two measurements of one displacement with independent errors: the result is their mean, weighted by
+    covariance. A motion that disagrees with odometry by more than `GATE_POSE`, was not seen, or is not finite, changes
+    nothing.
     """
     told = jnp.stack([motion.x, motion.y, motion.yaw])
     apart = wrap_last(told - moved)
@@ -102,13 +103,14 @@ def predict_seen(
 def weigh(
     P: Float[Array, "3 3"], R: Float[Array, "3 3"], apart: Float[Array, "3"]
 ) -> tuple[Float[Array, "3 3"], Float[Array, ""]]:
-    """The gain P (P + R)^-1 of a measurement of covariance R, and the squared Mahalanobis distance of `apart`."""
+    """The gain P (P + R)^-1 of a measurement with covariance R, and the squared Mahalanobis distance of `apart`."""
     S_inverse = inverse(P + R)
     return product(P, S_inverse), jnp.sum(apart * jnp.sum(S_inverse * apart, axis=1))
 
 
 def inverse(S: Float[Array, "3 3"]) -> Float[Array, "3 3"]:
-    """Of a symmetric positive matrix, whose rows may differ in unit: scaled to a diagonal of 1, then by cofactors."""
+    """Inverse of a symmetric positive matrix whose rows may differ in unit: scaled to a unit diagonal, then by
+    cofactors."""
     scale = 1 / jnp.sqrt(jnp.maximum(jnp.diagonal(S), 1e-30))
     a, b, c, d, e, f = (S * scale[:, None] * scale)[np.triu_indices(3)]
     rows = ((d * f - e * e, c * e - b * f, b * e - c * d), (c * e - b * f, a * f - c * c, b * c - a * e),
@@ -119,21 +121,21 @@ def inverse(S: Float[Array, "3 3"]) -> Float[Array, "3 3"]:
 
 
 def wrap_last(difference: Float[Array, "3"]) -> Float[Array, "3"]:
-    """A difference of two (x, y, yaw), its angle brought to (-pi, pi]."""
+    """A difference of two (x, y, yaw), with its angle wrapped to (-pi, pi]."""
     return difference.at[2].set(wrap_angle(difference[2]))
 
 
 @checked()
 def correct(belief: Belief, landmarks: Landmarks, sightings: Sightings) -> Belief:
-    """The belief after the landmarks seen, fused one after the other.
+    """The belief after the landmarks seen, fused one after another.
 
-    Iterated: what is seen is linearised about the believed pose first, and then anew about the pose that comes of
-    it, since after a long way without landmarks a heading may be some degrees off. Sightings that disagree with the
-    belief by more than `GATE` are refused. Unseen slots, and sightings that are not finite, change nothing.
+    Iterated: a sighting is linearised about the believed pose first, and then again about the resulting pose, since
+    after a long path without landmarks a heading may have an error of some degrees. Sightings that disagree with the
+    belief by more than `GATE` are rejected. Unseen slots, and sightings that are not finite, change nothing.
     """
     numbers = (landmarks.x, landmarks.y, sightings.x, sightings.y, sightings.sd)
     seen = landmarks.used & sightings.seen & jnp.isfinite(sum(numbers))
-    # Numbers of no meaning are 0: chosen away, NaN would still be in every derivative.
+    # Meaningless numbers are 0: NaN would stay in every derivative even if not selected.
     x, y, seen_x, seen_y, sd = (jnp.where(seen, values, 0.0) for values in numbers)
     slots = (x, y, landmarks.used, seen_x, seen_y, sd, seen)
 

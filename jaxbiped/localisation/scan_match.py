@@ -1,11 +1,11 @@
-"""Where a robot stands, by the walls that it has measured before: iterated closest points against a map of lines.
+"""The robot's pose from previously measured walls: iterated closest points against a map of lines.
 
 The map is a grid of normal distributions (Biber and Strasser, 2003): each cell keeps the first two moments, in plan,
-of the points that were measured on upright surfaces in it, of all views. Where these lie on a line, the line's normal
-and its spread along that are known, and a point of a new view that falls into the cell has a distance from the line.
-The pose that makes these distances least is found by Gauss-Newton steps (points to lines: Chen and Medioni, 1992), with
-the belief as the prior: what lines say nothing of, such as the way along a single wall, stays as it was believed.
-Floor, bumps and tops of boxes say nothing. Not in the paper, which has localisation without landmarks as future work.
+of the points of all views that were measured on upright surfaces in it. If these lie on a line, the line's normal and
+the spread along that are known, and a point of a new view in the cell has a distance from the line. The pose that
+minimises these distances is found by Gauss-Newton steps (points to lines: Chen and Medioni, 1992), with the belief as
+the prior: what lines do not determine, such as the position along a single wall, stays as believed. Floor, bumps and
+tops of boxes are not used. Not in the paper, where localisation without landmarks is future work.
 
 Written for one arena.
 """
@@ -28,19 +28,19 @@ from jaxbiped.localisation.kalman_filter import GATE_POSE, Belief, inverse
 from jaxbiped.mapping.grid import GridSpec
 from jaxbiped.sensing.view import View
 
-STEP = 8  # [px] between two points of a picture's column that are compared
-UPRIGHT = 1.5  # rise of a surface over its run from which it counts as upright
-LOWEST = 0.015  # [m] over the base floor: what is lower is floor
-NEAR_SD, DEPTH_SD = 0.002, 0.006  # [m, m/m^2] spread of a measured point: at once, and by its range squared
-MOST = 384  # points of a view that are matched
-LEAST_WEIGHT = 6.0  # points as good as one at `NEAR_SD`, say, that make a line
-THIN = 0.12  # of a line: its variance across over that along, at most
-LEAST_LENGTH = 0.008  # [m] standard deviation along a line, at least
+STEP = 8  # [px] between two compared points in a picture's column
+UPRIGHT = 1.5  # slope (rise over run) from which a surface counts as upright
+LOWEST = 0.015  # [m] above the base floor: anything lower is floor
+NEAR_SD, DEPTH_SD = 0.002, 0.006  # [m, m/m^2] spread of a measured point: constant, and per squared range
+MOST = 384  # most points of a view that are matched
+LEAST_WEIGHT = 6.0  # least number of points for a line, weighted relative to one with spread `NEAR_SD`
+THIN = 0.12  # largest ratio of a line's variance across to that along
+LEAST_LENGTH = 0.008  # [m] smallest standard deviation along a line
 REACH = 0.06  # [m] from a line's middle within which a point may belong to it
-WIDE = 3.0  # standard deviations beyond which a point does not
+WIDE = 3.0  # standard deviations beyond which a point does not belong to it
 ROUNDS = 5
-INDEPENDENT = 12.0  # points that those of a view count as together: their errors, and those of the map, hang together
-LEAST_POINTS = 8.0  # on lines, to say anything
+INDEPENDENT = 12.0  # independent points that a view counts as: their errors, and the map's, are correlated
+LEAST_POINTS = 8.0  # fewest points on lines for a match
 
 
 @jax.tree_util.register_dataclass
@@ -67,7 +67,7 @@ class Walls:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Lines:
-    """What a map says of each cell: a line through (x, y) [m], world frame, with a normal."""
+    """The line in each cell of a map, through (x, y) [m] in the world frame, with a normal."""
 
     x: Float[Array, "H W"]
     y: Float[Array, "H W"]
@@ -78,21 +78,21 @@ class Lines:
 
 
 def no_outlines(spec: GridSpec) -> Outlines:
-    """Before the first view."""
+    """The map before the first view."""
     return Outlines(jnp.zeros(spec.shape), jnp.zeros((*spec.shape, 2)), jnp.zeros((*spec.shape, 3)))
 
 
 @checked()
 def find_walls(view: View, shape: tuple[int, int], step: int, ground: Float[Array, ""]) -> Walls:
-    """The points of a level view on upright surfaces: those that lie above or below a neighbour, not behind it.
+    """The points of a level view on upright surfaces: those above or below a neighbour, not behind it.
 
     Args:
-      shape: static; rows and columns of the picture that the points are of, one for each row of `view`, in order.
-      step: static; rows from a point to the neighbours that it is compared with.
+      shape: static; rows and columns of the picture from which the points come, in the order of `view`.
+      step: static; rows from a point to the neighbours with which it is compared.
       ground: [m] height of the surface under the robot above the base floor.
 
     Raises:
-      InputError: an argument of another rank, shape or type, a `shape` that is not of so many points, or a `step` that
+      InputError: an argument of another rank, shape or type, a `shape` for another number of points, or a `step` that
         is not within its rows.
     """
     if math.prod(shape) != view.x.shape[0] or min(shape) < 1:
@@ -113,7 +113,7 @@ def find_walls(view: View, shape: tuple[int, int], step: int, ground: Float[Arra
 
 
 def thinned(walls: Walls, shape: tuple[int, int]) -> Walls:
-    """At most about `MOST` of the good points, spread over the picture: those whose turn it is."""
+    """At most about `MOST` of the good points, evenly spread over the picture."""
     count = jnp.sum(walls.good)
     every = jnp.maximum(jnp.ceil(count / MOST), 1.0)
     turn = jnp.cumsum(walls.good) - 1
@@ -141,7 +141,7 @@ def add_walls(outlines: Outlines, walls: Walls, pose: Pose, spec: GridSpec) -> O
 def cells(
     x: Float[Array, "N"], y: Float[Array, "N"], spec: GridSpec
 ) -> tuple[Int[Array, "N"], Int[Array, "N"], Bool[Array, "N"]]:
-    """Row and column of the cell of each point, the nearest where it lies outside, and whether it lies inside."""
+    """Row and column of the cell of each point (the nearest for points outside), and whether it is inside."""
     height, width = spec.shape
     i, j = jnp.floor(y / spec.pitch), jnp.floor(x / spec.pitch)
     inside = (i >= 0) & (i < height) & (j >= 0) & (j < width)
@@ -149,7 +149,7 @@ def cells(
 
 
 def find_lines(outlines: Outlines, spec: GridSpec) -> Lines:
-    """The lines of a map. A cell without one has that of the neighbour, across or along, that knows most of one."""
+    """The lines of a map. A cell without one takes that of the best-known neighbour, across or along."""
     weight = jnp.maximum(outlines.weight, 1e-12)
     mx, my = outlines.first[..., 0] / weight, outlines.first[..., 1] / weight
     xx, xy, yy = (outlines.second[..., k] / weight for k in range(3))
@@ -182,10 +182,10 @@ def shifted(values: Array, way: int, axis: int) -> Array:
 
 @checked()
 def match(belief: Belief, walls: Walls, outlines: Outlines, spec: GridSpec) -> Belief:
-    """The belief after the points of a view were laid onto the lines of the map.
+    """The belief after the points of a view were matched to the lines of the map.
 
-    It stays as it was where fewer than `LEAST_POINTS` points lie on lines, where the pose would move by more than
-    `GATE_POSE` (squared Mahalanobis distance), and where anything is not finite.
+    It is unchanged if fewer than `LEAST_POINTS` points lie on lines, if the pose would move by more than `GATE_POSE`
+    (squared Mahalanobis distance), or if anything is not finite.
     """
     lines = find_lines(outlines, spec)
     prior = inverse(belief.cov + 1e-10 * jnp.eye(3))
@@ -211,7 +211,7 @@ def normal_equations(
 ) -> tuple[Float[Array, "3 3"], Float[Array, "3"], Float[Array, ""]]:
     """Information and gradient of the distances of points from lines, by (x, y, yaw) of the pose, and how many count.
 
-    Weights are Tukey's, over each distance's own spread.
+    Weights are Tukey's, relative to each distance's own spread.
     """
     x, y = to_world(pose, walls.x, walls.y)
     i, j, inside = cells(x, y, spec)
@@ -241,7 +241,8 @@ def solve(A: Float[Array, "3 3"], b: Float[Array, "3"]) -> Float[Array, "3"]:
 
 
 def picture_shape(points: int, width: int, height: int) -> tuple[tuple[int, int], int]:
-    """Rows and columns of a picture of so many points that stand for width x height pixels, and the `step` in rows."""
+    """Rows and columns of a picture with this many points that represent width x height pixels, and the `step` in
+    rows."""
     stride = np.sqrt(width * height / points)
     rows = round(height / stride)
     return (rows, points // rows), max(1, round(STEP / stride))

@@ -1,9 +1,9 @@
-"""The compiled driver: a queue of missions worked off by a fixed number of slots.
+"""The compiled driver: a queue of missions processed by a fixed number of slots.
 
 Missions differ in length by a factor of ten, and a batch that waits for its longest member idles most of its slots. So
-a slot whose mission has ended takes the next job at once, inside the compiled loop. What a slot computes
-does not depend on its neighbours, hence a mission's result depends neither on the number of slots nor on its
-place in the queue. On several devices each works off a list of jobs of its own.
+a slot whose mission has ended takes the next job at once, inside the compiled loop. What a slot computes does not
+depend on its neighbours, so a mission's result depends neither on the number of slots nor on its place in the queue.
+With several devices, each processes its own list of jobs.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.mission.state import AgentState, Planned, WorldState, start
 
-SLOTS = 64  # missions at once: maps of this many arenas fit the cache of one core
-TURNS = 32  # decisions between two looks of the host at the queue
+SLOTS = 64  # missions at once: the maps of this many arenas fit in the cache of one core
+TURNS = 32  # decisions between two checks of the queue by the host
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Jobs:
-    """`N` missions to run: which arena, under which settings, with which noise."""
+    """`N` missions to run: their arenas, settings and noise."""
 
     arena: Int[Array, "N"]  # index into the arenas
     point: Int[Array, "N"]  # index into the settings
@@ -47,20 +47,20 @@ class Jobs:
 class Result:
     """How each mission ended."""
 
-    code: Int[Array, "N"]  # Code; RUNNING where it has not
+    code: Int[Array, "N"]  # Code; RUNNING if it has not ended
     distance: Float[Array, "N"]  # [m] walked
     time: Float[Array, "N"]  # [s]
     measurements: Int[Array, "N"]
     decisions: Int[Array, "N"]
-    goal_distance: Float[Array, "N"]  # [m] from the goal, at the end
-    pose_error: Float[Array, "N"]  # [m] from where the robot believed to stand, at the end
-    yaw_error: Float[Array, "N"]  # [rad] the same of its yaw
+    goal_distance: Float[Array, "N"]  # [m] distance from the goal at the end
+    pose_error: Float[Array, "N"]  # [m] distance from the believed position at the end
+    yaw_error: Float[Array, "N"]  # [rad] the same for yaw
     planned: Planned
-    metrics: tuple = ()  # what each metric remembers at the end
+    metrics: tuple = ()  # state of each metric at the end
 
 
 def ending(world: WorldState, goal_xy: Float[Array | np.ndarray, "*N 2"]) -> Result:
-    """How missions ended whose worlds these are, in arenas with these goals."""
+    """The results of missions with these worlds, in arenas with these goals."""
     away = jnp.hypot(goal_xy[..., 0] - world.pose.x, goal_xy[..., 1] - world.pose.y)
     done = world.code, world.distance, world.time, world.measurements, world.decisions
     return Result(*done, away, world.pose_error, world.yaw_error, world.planned, world.metrics)
@@ -70,7 +70,7 @@ def no_results(*shape: int, metrics: tuple = ()) -> Result:
     """Zeros, on the host.
 
     Args:
-      metrics: arrays, or their shapes and types, of what the metrics of one mission remember.
+      metrics: arrays, or their shapes and types, of the states of one mission's metrics.
     """
     kinds = int, float, float, int, int, float, float, float
     planned = Planned(*(np.zeros(shape, kind) for kind in (float, int, float)))
@@ -85,24 +85,24 @@ class Queue:
 
     world: WorldState  # [S]
     mind: AgentState  # [S]
-    job: Int[Array, "S"]  # that the slot works on; count or more: idle
+    job: Int[Array, "S"]  # job of the slot; count or more: idle
     next_job: Int[Array, ""]
     result: Result
 
 
 @dataclass(frozen=True)
 class Tally:
-    """How far a queue is."""
+    """Progress of a queue."""
 
     ended: int  # missions
-    reached: int  # of these, as they should
+    reached: int  # of these, reached
 
     def __add__(self, other: Tally) -> Tally:
         return Tally(self.ended + other.ended, self.reached + other.reached)
 
 
 def tally(code: Int[np.ndarray, "N"]) -> Tally:
-    """Of a queue's codes so far."""
+    """The tally of a queue's codes so far."""
     return Tally(int(np.sum(code != Code.RUNNING)), int(np.sum(code == Code.REACHED)))
 
 
@@ -119,19 +119,19 @@ def compile_queue(
     slots: int = SLOTS,
     mesh: Mesh | None = None,
 ) -> Work:
-    """The compiled driver for arguments of these shapes.
+    """Compile the driver for arguments of these shapes.
 
     Args:
       arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
-      program: static. One compilation for each (program, slots, A, P, N), which later calls share.
-      slots: static; of each device.
-      mesh: static; devices of which each has a list of jobs, and `fill` and `segment` of its own: leaves of jobs,
-        count too, and of results have another axis [D] then, the first.
+      program: static. One compilation for each (program, slots, A, P, N), shared by later calls.
+      slots: static; slots per device.
+      mesh: static; devices, each with its own list of jobs, `fill` and `segment`: leaves of jobs, including count, and
+        of results then have another leading axis [D].
 
     Returns:
-      A function of (arenas, settings, jobs, on_progress) that works the queue off and gives results in the order of
-      the jobs; padding stays RUNNING. It may be called by several threads at once. `on_progress` is called on the
-      host with the tally of the jobs, every `TURNS` decisions.
+      A function of (arenas, settings, jobs, on_progress) that processes the queue and returns results in the order of
+      the jobs; padding stays RUNNING. Several threads may call it at once. `on_progress` is called on the host with the
+      tally of the jobs, every `TURNS` decisions.
     """
     signature = (program, slots, mesh, jax.tree.structure((arenas, settings, jobs)), *shapes((arenas, settings, jobs)))
     if signature not in COMPILED:
@@ -173,7 +173,7 @@ COMPILED: dict = {}
 
 
 def on_row(function: Callable, *which: int) -> Callable:
-    """`function` for arguments of which some have a leading axis of size 1, and then the result has."""
+    """`function` with a leading axis of size 1 on some arguments, and then on the result."""
 
     def call(*arguments):
         arguments = [
@@ -186,10 +186,10 @@ def on_row(function: Callable, *which: int) -> Callable:
 
 
 def wide(lowered: jax.stages.Lowered) -> jax.stages.Compiled:
-    """Compiled with vectors of 512 bits where a CPU has them; the default of half of that is a few per cent slower."""
+    """Compile with 512-bit vectors where a CPU has them; the default of half that is a few per cent slower."""
     try:
         return lowered.compile(compiler_options={"xla_cpu_prefer_vector_width": 512})
-    except jax.errors.JaxRuntimeError:  # a compiler that has no such option
+    except jax.errors.JaxRuntimeError:  # a compiler without this option
         return lowered.compile()
 
 
@@ -210,7 +210,7 @@ def fill(arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpe
 
 
 def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpec) -> Queue:
-    """Up to `TURNS` decisions of every slot."""
+    """Run up to `TURNS` decisions of every slot."""
 
     def unfinished(carry: tuple[Array, Queue]):
         turns, queue = carry
@@ -224,7 +224,7 @@ def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, pr
         return turns + 1, advance(Queue(world, mind, queue.job, queue.next_job, queue.result), arena)
 
     def advance(queue: Queue, arena: Arena) -> Queue:
-        """Write down the missions that have ended, and give their slots the next jobs."""
+        """Record the missions that have ended, and give their slots the next jobs."""
         world = queue.world
         ended = (queue.job < jobs.count) & (world.code != Code.RUNNING)
         last = ending(world, arena.goal_xy)
@@ -237,7 +237,7 @@ def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, pr
             return jnp.where(ended.reshape(-1, *[1] * (new.ndim - 1)), new, old)
 
         world = jax.tree.map(renew, fresh_world, world)
-        # The map is left as it is: a fresh mind does not look at it, and wiping it here costs a pass over it.
+        # The map is left as it is: a fresh mind does not read it, and clearing it here would cost a pass over it.
         grid_map = queue.mind.grid_map
         mind = jax.tree.map(renew, replace(fresh_mind, grid_map=None), replace(queue.mind, grid_map=None))
         mind = replace(mind, grid_map=grid_map)
@@ -249,7 +249,7 @@ def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, pr
 def begin(
     arenas: Arena, settings: MissionParams, jobs: Jobs, job: Int[Array, "S"], program: MissionSpec
 ) -> tuple[WorldState, AgentState]:
-    """Fresh missions for the jobs of all slots; a slot without a job has one that has ended."""
+    """Fresh missions for the jobs of all slots; a slot without a job gets one that has ended."""
     at = jnp.minimum(job, jobs.arena.shape[0] - 1)
     arena, setting = pick(arenas, jobs.arena[at]), pick(settings, jobs.point[at])
     begun = jax.vmap(start, in_axes=(0, 0, 0, None, None))
@@ -263,5 +263,5 @@ def pick(tree, index: Int[Array, "S"]):
 
 
 def stack(trees: list):
-    """Pytrees of the same kind as one, with a new leading axis."""
+    """Stack pytrees of the same kind into one, with a new leading axis."""
     return jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *trees)

@@ -1,4 +1,4 @@
-"""What may be chosen of a mission: the config for people. `mission.settings` has its traced form, and loads JAX."""
+"""The options of a mission: the config for users. `mission.settings` has its traced form, and loads JAX."""
 
 from __future__ import annotations
 
@@ -28,37 +28,38 @@ if TYPE_CHECKING:
     from jaxbiped.mission.strategies import Strategy
     from jaxbiped.planning.costs import Costs
 
-# [m] greatest radius of a body in a sweep; static, since it sets how many cells the map visits around each
+# [m] largest radius of a body in a sweep; static, since it sets how many cells the map visits around each
 MAX_RADIUS = 0.15
-HEADROOM = 12  # levels above that of the highest ground that a map holds: those within a standing robot of 38.5 cm
+HEADROOM = 12  # levels that a map holds above the highest ground: those within a standing robot of 38.5 cm
 RENDERED = ("stereo",)  # sensors that measure on the host
-SENSORS, EXECUTORS = ("raycast", "oracle", *RENDERED), ("kinematic", "sampled", *SIMULATED)  # that are built in
-VISUAL = ("visual", "both")  # localisations that measure the motion between two views
-ICP = ("icp", "both")  # those that measure the pose by walls that were measured before
+SENSORS, EXECUTORS = ("raycast", "oracle", *RENDERED), ("kinematic", "sampled", *SIMULATED)  # built-in ones
+VISUAL = ("visual", "both")  # localisations that measure motion between two views
+ICP = ("icp", "both")  # those that measure the pose from previously measured walls
 
 
 def known_sensor(name: str) -> str:
-    """A name that is registered, or `package.module:name`, of which nothing is imported here."""
+    """A registered name, or `package.module:name`, from which nothing is imported here."""
     return known_name(name, SENSORS, SENSORS_OWN, "sensor")
 
 
 def known_executor(name: str) -> str:
-    """The same of an executor."""
+    """The same for an executor."""
     return known_name(name, EXECUTORS, EXECUTORS_OWN, "executor")
 
 
 SensorName = Annotated[str, pydantic.AfterValidator(known_sensor)]
 ExecutorName = Annotated[str, pydantic.AfterValidator(known_executor)]
 
-# Bounded so that sums of costs along a path keep their differences in single precision.
+# Bounded so that differences between sums of costs along a path survive in single precision.
 Cost = Annotated[float, pydantic.Field(ge=0.0, le=1e4)]
 
 
 class CostConfig(Model):
-    """Costs of Eq. (1) on a pitch of 5 cm; the paper's values (3.1). Other pitches: `planning.Costs.at_pitch`."""
+    """Costs of Eq. (1) on a pitch of 5 cm; the paper's values (3.1). For other pitches see
+    `planning.Costs.at_pitch`."""
 
     c0: Annotated[float, pydantic.Field(ge=0.1, le=1e3)] = 1.0
-    """Distance, a cell. Never free: a path must come nearer to its goal with each cell."""
+    """Distance, per cell. Never zero: each cell of a path must come nearer to the goal."""
     c1: Cost = 1.0
     """Floor to floor."""
     c2: Cost = 5.0
@@ -66,7 +67,7 @@ class CostConfig(Model):
     c3: Cost = 10.0
     """Up or down one step."""
     c4: Cost = 100.0
-    """Into what is unmeasured."""
+    """Into an unmeasured cell."""
 
     def traced(self) -> Costs:
         """The same as arrays."""
@@ -78,48 +79,48 @@ class CostConfig(Model):
 
 
 class LimitConfig(Model):
-    """When a mission ends."""
+    """Conditions that end a mission."""
 
     goal_radius: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.10
-    """[m] reached when this near to the goal (paper, 3.1)."""
+    """[m] The goal is reached within this distance (paper, 3.1)."""
     max_decisions: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 150
-    """Decisions after which a mission is out of steps."""
+    """Decisions after which a mission ends as out of steps."""
     max_looks: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 4
-    """Measurements in a row that show no path, each a quarter turn on, after which the robot gives up: once around."""
+    """Successive measurements without a path, a quarter turn apart, after which the robot gives up: once around."""
     edge_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = 0.02
-    """[m] that an edge may lie off under the robot before it falls; simulated bipeds fell from 0.025 on."""
+    """[m] Largest error of an edge's position under the robot without a fall; simulated bipeds fell from 0.025 on."""
     height_tolerance: Annotated[float, pydantic.Field(ge=0.0, le=0.1)] = HEIGHT_TOLERANCE
-    """[m] that the ground may be off the height stepped to; simulated bipeds took -12 to +8 mm."""
+    """[m] Largest error of the ground's height after a step; simulated bipeds tolerated -12 to +8 mm."""
     start_sd: tuple[float, float] = (0.002, 0.005)
-    """[m, rad] how well the robot knows where it starts."""
+    """[m, rad] Standard deviations of the initial pose."""
 
 
 class WalkConfig(Model):
     """How simulated bipeds walk, and where."""
 
     pace: Literal["fast", "paper"] = "fast"
-    """How fast primitives are simulated; the mission's clock counts Table 2's durations in any case."""
+    """Speed of simulated primitives; the mission's clock counts Table 2's durations in any case."""
     slots: Annotated[int, pydantic.Field(ge=1, le=65536)] = 32
-    """Bipeds at once."""
+    """Number of bipeds simulated at once."""
     device: Literal["cpu", "gpu", "tpu"] | None = None
-    """Where `mjx` runs; None: JAX's default."""
+    """Device of `mjx`; None: JAX's default."""
     threads: Annotated[int, pydantic.Field(ge=0, le=1024)] = 0
-    """Of `native`; 0: one a logical CPU."""
+    """Threads of `native`; 0: one per logical CPU."""
     impl: Literal["jax", "warp"] = "jax"
     """Of `mjx`."""
     biped: RobotModelConfig = RobotModelConfig()
 
     def options(self, executor: str) -> dict[str, Any]:
-        """For `physics.make`."""
+        """Options for `physics.make`."""
         own = {"threads": self.threads} if executor == "native" else {"impl": self.impl}
         return own | {"device": self.device}
 
 
 class MissionConfig(Model):
-    """One kind of mission. Every default is the paper's value, or named where it is chosen."""
+    """One kind of mission. Every default is the paper's value, unless stated otherwise."""
 
     sensor: SensorName = "raycast"
-    """What the robot sees with: raycast (noisy rays), oracle (the truth), stereo, or package.module:name. Rays have the
+    """The robot's sensor: raycast (noisy rays), oracle (the truth), stereo, or package.module:name. Rays have the
     noise of a stereo camera; the pictures of `stereo` are rendered and matched on the host."""
     preset: str = "rendered"
     """How well the camera measures: ideal, rendered, real, or a sensor file (.toml). It is the default of each number

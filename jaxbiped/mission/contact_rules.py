@@ -1,4 +1,4 @@
-"""What true boxes and terrain do to a biped whose movements are drawn, not simulated: edges, falls and contacts."""
+"""Effects of true boxes and terrain on a biped whose movements are drawn, not simulated: edges, falls and contacts."""
 
 from __future__ import annotations
 
@@ -13,25 +13,26 @@ from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world
 from jaxbiped.mission.execution import TOUCH
 
-NEAREST, FURTHEST, SPACING = -0.02, 0.20, 0.0025  # [m] ahead of the middle between the feet, where edges are looked for
-NONE = 1.0  # [m] where no edge is found
-KICK = 0.01  # [m] above what it may step on that a foot may touch
-FOOT_TOP = 0.045  # [m] below which only feet are
-# The upper body of the simulated biped (biped.model), two lying capsules: half width and radius, and how far below
+NEAREST, FURTHEST, SPACING = -0.02, 0.20, 0.0025  # [m] ahead of the midpoint of the feet, where edges are searched
+NONE = 1.0  # [m] if no edge is found
+KICK = 0.01  # [m] height above the allowed step that a foot may touch
+FOOT_TOP = 0.045  # [m] only feet are below this height
+# The upper body of the simulated biped (biped.model), two horizontal capsules: half width and radius, and how far below
 # the camera's top they begin and end [m].
 HEAD, TORSO = (0.060, 0.015, 0.0, 0.030), (0.020, 0.040, 0.058, 0.138)
-LATERAL = np.linspace(-1.0, 1.0, 9)  # where across the body it is checked
+LATERAL = np.linspace(-1.0, 1.0, 9)  # lateral positions at which the body is checked
 
 
 def edges(arena: Arena, pose: Pose, offset: Float[Array, ""], rise: Float[Array, ""]) -> tuple[Float[Array, "2"], ...]:
-    """Distance [m] ahead of the robot to the first rise by a level, and to the first drop, on the ways of the two feet.
+    """Distance [m] ahead of the robot to the first rise by a level, and to the first drop, on the paths of the two
+    feet.
 
     Args:
-      offset: [m] of each foot to the side.
-      rise: [m] of one level; half of it tells ground from ground.
+      offset: [m] lateral offset of each foot.
+      rise: [m] height of one level; half of it is the threshold.
 
     Returns:
-      (rises, drops), each for the left and the right foot; `NONE` where there is none.
+      (rises, drops), each for the left and the right foot; `NONE` if there is none.
     """
     ahead = jnp.arange(NEAREST, FURTHEST, SPACING)
     side = jnp.stack([offset, -offset])[:, None]
@@ -47,8 +48,8 @@ def off_ground(
     """Whether the ground under the feet is so much higher or lower than `pose.z` that the robot falls.
 
     Args:
-      rims: `mission.library.Rims`: how near to the middle of a sole a rise, and a drop, may begin.
-      tolerance: [m] of height that is borne.
+      rims: `mission.library.Rims`: how near to the middle of a sole a rise, or a drop, may begin.
+      tolerance: [m] tolerated difference in height.
     """
     up_ahead, up_aside, down_ahead, down_aside = rims
     zero = jnp.zeros(())
@@ -63,7 +64,7 @@ def off_ground(
 
 
 def body_touches(arena: Arena, pose: Pose, head: Float[Array, ""], sway: Float[Array, ""]) -> Bool[Array, ""]:
-    """Whether head or torso meet a box, or terrain, while they sway by `sway` [m] to both sides.
+    """Whether head or torso hit a box or terrain while they sway by `sway` [m] to both sides.
 
     Args:
       head: [m] height of the camera's top above `pose.z`.
@@ -82,10 +83,10 @@ def body_touches(arena: Arena, pose: Pose, head: Float[Array, ""], sway: Float[A
 
 
 def feet_touch(arena: Arena, pose: Pose, feet: Float[Array, "3"], highest: Float[Array, ""]) -> Bool[Array, ""]:
-    """Whether a foot meets a box, or terrain, that is higher than `highest` [m], more than it may step on.
+    """Whether a foot hits a box or terrain that is higher than `highest` [m], the most it may step on.
 
     Args:
-      feet: [m] length and width of a sole, and its offset to the side.
+      feet: [m] length and width of a sole, and its lateral offset.
     """
     boxes = arena.boxes
     length, width, offset = feet

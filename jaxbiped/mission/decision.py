@@ -1,6 +1,6 @@
 """The decision: localise, update the map, plan, select (paper, Fig. 2). One pure function of a batch of missions.
 
-This is the place where rooms that are written for one arena are vmapped. The planner takes the whole batch.
+Rooms that are written for one arena are vmapped here. The planner takes the whole batch.
 """
 
 from __future__ import annotations
@@ -36,16 +36,16 @@ LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is know
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class DecisionTrace:
-    """What led to a command; for logs and pictures."""
+    """The basis of a command; for logs and pictures."""
 
     classes: Int[Array, "B H W"]
     levels: Int[Array, "B H W"]
-    problem: Problem  # [B] that the planner was asked
-    route: Route  # [B] its answer
+    problem: Problem  # [B] input of the planner
+    route: Route  # [B] output of the planner
     pose: Pose  # [B] as believed
     view: View  # [B N] what was measured
-    evidence: Float[Array, "B H W Z"]  # of the 3D grid, with that view
-    landmarks: Bool[Array, "B L"]  # that were seen
+    evidence: Float[Array, "B H W Z"]  # of the 3D grid, including that view
+    landmarks: Bool[Array, "B L"]  # landmarks seen
 
 
 @with_own_settings
@@ -58,16 +58,16 @@ def decide(
     program: MissionSpec,
     active: Bool[Array, "B"] | None = None,
 ) -> tuple[AgentState, Command, Int[Array, "B"], DecisionTrace]:
-    """What each robot does next. All arguments have a leading batch axis.
+    """The next action of each robot. All arguments have a leading batch axis.
 
-    Of the arena only what the robot was told is read: landmarks and goal (paper, 2, conditions 2 and 3).
+    Of the arena, only what the robot has been told is read: landmarks and goal (paper, 2, conditions 2 and 3).
 
     Args:
       active: robots whose decision is used; by default all.
 
     Returns:
-      The mind after the measurement, the command, the code with which the mission ends of the robot's own
-      will (else RUNNING), and the thought.
+      The mind after the measurement, the command, the code with which the robot itself ends the mission (else
+      RUNNING), and the decision trace.
     """
     mind, classes, levels, ij = perceive(mind, view, sightings, arena, settings, program)
     spec = program.spec
@@ -97,7 +97,7 @@ def decide(
 
 
 def counted(planned: Planned, route: Route) -> Planned:
-    """What is told of a mission's planning, with one more route."""
+    """A mission's planning statistics, with one more route."""
     unknown = jnp.full_like(planned.seconds, jnp.nan)
     seconds = unknown if route.seconds is None else route.seconds
     cost = unknown if route.cost is None else route.cost
@@ -108,16 +108,16 @@ def counted(planned: Planned, route: Route) -> Planned:
 def perceive(
     mind: AgentState, view: View, sightings: Sightings, arena: Arena, settings: MissionParams, program: MissionSpec
 ) -> tuple[AgentState, Int[Array, "B H W"], Int[Array, "B H W"], Int[Array, "B 2"]]:
-    """Each robot after a measurement: its mind, the classed map, and its cell."""
+    """Update each robot with a measurement: its mind, the classed map, and its cell."""
     mind = jax.vmap(localise, in_axes=(0, 0, 0, 0, 0, None))(mind, view, sightings, arena.landmarks, settings, program)
     mind = begin_maps(mind, settings, program.spec)
     return jax.vmap(read_map, in_axes=(0, 0, 0, None))(mind, view, settings, program)
 
 
 def begin_maps(mind: AgentState, settings: MissionParams, spec: GridSpec) -> AgentState:
-    """Fresh minds with a map of nothing but what their robot stands on.
+    """Give fresh minds a map of only the ground that their robot stands on.
 
-    Few of a batch are fresh at once, and maps are large: only theirs are written.
+    Few minds of a batch are fresh at once, and maps are large: only theirs are written.
     """
     pose = mind.belief.pose
 
@@ -141,9 +141,9 @@ def level_of(z: Float[Array, ""], spec: GridSpec) -> Int[Array, ""]:
 def read_map(
     mind: AgentState, view: View, settings: MissionParams, program: MissionSpec
 ) -> tuple[AgentState, Int[Array, "H W"], Int[Array, "H W"], Int[Array, "2"]]:
-    """One robot with one more view: its mind, the classed map, and its cell.
+    """Update one robot with one more view: its mind, the classed map, and its cell.
 
-    Heights are counted, level by level; what its ground is off a level was measured before it stepped there.
+    Heights are counted level by level; the offset of its ground from a level was measured before it stepped there.
     """
     spec, pose = program.spec, mind.belief.pose
     ij = cell_of(pose.x, pose.y, spec)
@@ -154,7 +154,7 @@ def read_map(
     eye = eye_of(mind, settings, program) if program.fading else None
     grid_map = mapping.update(mind.grid_map, view, pose, settings.body, settings.mapping, spec, tilted, eye)
     classes, levels = mapping.classify(grid_map, settings.mapping, spec)
-    # Where the robot stands it can stand, on the level that it stands on, whatever the map makes of it.
+    # The robot can stand where it stands, on its current level, whatever the map says.
     level = level_of(pose.z, spec)
     own = classes[ij[0], ij[1]]
     ground = jnp.where(level > 0, Cell.BUMP, Cell.FLOOR).astype(jnp.int8)
@@ -164,7 +164,7 @@ def read_map(
 
 
 def eye_of(mind: AgentState, settings: MissionParams, program: MissionSpec) -> Eye:
-    """What a robot measures by, and how much it keeps of what its new view tells otherwise."""
+    """How a robot measures, and how much it keeps of older evidence that contradicts its new view."""
     at = mount(settings.camera, mind.look, mind.squat)
     return Eye(settings.camera, at, program.image, keep=jnp.exp(-mind.since / settings.mapping.fade))
 
@@ -185,7 +185,7 @@ def choose(
 
     In the goal's cell there is nowhere to go: if the referee has not ended the mission by then, the robot is stuck.
     Without a path it turns on the spot and measures again, all around, before it gives up. The blind strategy
-    stops before anything but floor.
+    stops at anything but floor.
     """
     spec = program.spec
     first = jnp.maximum(directions[: stride(spec)], 0)
@@ -217,7 +217,7 @@ def choose(
 
 
 def nearest_direction(yaw: Float[Array, ""]) -> Int[Array, ""]:
-    """Index into DIRECTIONS of the move that a yaw [rad] points along most."""
+    """Index into DIRECTIONS of the move closest to a yaw [rad]."""
     moves = jnp.asarray(planning.DIRECTIONS, jnp.float32)
     return jnp.argmin(jnp.abs(wrap_angle(jnp.arctan2(moves[:, 0], moves[:, 1]) - yaw))).astype(jnp.int32)
 

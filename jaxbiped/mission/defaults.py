@@ -1,7 +1,7 @@
-"""Fields of a mission whose default another field decides: declared here, and filled in at one place.
+"""Fields of a mission whose default is decided by another field: declared and filled in here.
 
-What is given wins, wherever it is given: on the command line, in TOML, or in Python, where the fields count that were
-set when a model was made.
+Given values take precedence, wherever they are given: on the command line, in TOML, or in Python, where the fields
+count that were set when a model was created.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from jaxbiped.motion.config import RobotConfig
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import sensor_preset
 
-SWAYING = 0.125  # [m] a walking biped sways, and its stereo camera, as wide as the body, sweeps 12 cm to either side
+SWAYING = 0.125  # [m] a walking biped sways, and its stereo camera, as wide as the body, sweeps 12 cm to each side
 BELOW_POINTS = 50.0  # for rendered stereo; others keep the map that was published
 SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 
-OTHER = ""  # stands for each value that a table does not name
-# Choice: value: what it makes the default of other fields.
+OTHER = ""  # stands for all values not in a table
+# Choice: value: resulting defaults of other fields.
 BY_CHOICE: dict[str, dict[str, dict[str, float]]] = {
     "executor": {"kinematic": {}, OTHER: {"robot.radius": SWAYING}},
     "sensor": {"stereo": {"mapping.below_points": BELOW_POINTS}},
 }
-FOLLOWING = {"robot.height_tolerance": "limits.height_tolerance"}  # field: whose value is its default, where given
-OF_PRESET = ("stereo", "landmarks")  # parts whose fields the preset gives; and `camera`, where it has rays
+FOLLOWING = {"robot.height_tolerance": "limits.height_tolerance"}  # field: that whose value is its default, if given
+OF_PRESET = ("stereo", "landmarks")  # parts whose fields come from the preset; and `camera`, if the preset has rays
 OF_FILE: dict[str, type[Model]] = {"robot": RobotConfig, "camera": CameraConfig}
 DECIDING = ("preset", *BY_CHOICE, *FOLLOWING.values())
 
 
 def with_defaults(data: dict[str, Any]) -> dict[str, Any]:
-    """The fields of a mission as they are given, with those filled in that follow from others.
+    """The given fields of a mission, with those filled in that follow from others.
 
-    What is wrong is left as it is: the model says so.
+    Invalid values are left as they are, for the model to report.
     """
     for part, model in OF_FILE.items():
         if part in data:
@@ -71,7 +71,7 @@ def filled(data: dict[str, Any], field: str, default: Any) -> dict[str, Any]:
 
 
 def given_fields(part: Any) -> dict[str, Any] | None:
-    """The fields of a part that were given; None where it is no part."""
+    """The fields of a part that were given; None if it is not a part."""
     if isinstance(part, Model):
         return {name: getattr(part, name) for name in part.model_fields_set}
     return dict(part) if isinstance(part, Mapping) else None

@@ -1,4 +1,4 @@
-"""What an executor is, that plays a command of one arena in the true world inside the compiled loop."""
+"""Base of executors, which play a command of one arena in the true world inside the compiled loop."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.config import SIMULATED
 from jaxbiped.motion.config import STEP_TOLERANCE
 
-CHECKS = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
-TOUCH = STEP_TOLERANCE  # [m] contact that counts as none: rounding, and boxes that just end at a height
+CHECKS = (1 / 3, 2 / 3, 1.0)  # fractions of its path at which the body is checked against boxes
+TOUCH = STEP_TOLERANCE  # [m] contact that is ignored: rounding, and boxes that end exactly at a height
 ODOMETRY = 2  # channel of a mission's seed
 PLAY = 3  # channel of a mission's seed
 
@@ -26,11 +26,11 @@ PLAY = 3  # channel of a mission's seed
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Execution:
-    """What came of one command."""
+    """The outcome of one command."""
 
-    pose: Pose  # true, after it
-    moved: Float[Array, "*B 3"]  # dx, dy [m], dyaw [rad] by odometry, in the robot frame before it
-    variances: Float[Array, "*B 3"]  # of that
+    pose: Pose  # true pose afterwards
+    moved: Float[Array, "*B 3"]  # dx, dy [m], dyaw [rad] by odometry, in the robot frame before the command
+    variances: Float[Array, "*B 3"]  # variances of `moved`
     time: Float[Array, "*B"]  # [s]
     distance: Float[Array, "*B"]  # [m]
     collided: Bool[Array, "*B"]
@@ -39,13 +39,13 @@ class Execution:
 
 
 class Executor:
-    """The base of executors: a frozen dataclass that is a pytree, as planners are. It is written for one robot."""
+    """Base class of executors: a frozen dataclass that is a pytree, like planners. It is written for one robot."""
 
-    places_feet: ClassVar[bool] = False  # whether feet are placed by measured edges, where the config does not say
-    on_terrain: ClassVar[bool] = False  # it knows arenas with terrain
+    places_feet: ClassVar[bool] = False  # default for placing feet by measured edges
+    on_terrain: ClassVar[bool] = False  # whether it supports arenas with terrain
 
     def execute(self, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
-        """What comes of one `Command` in an `Arena`, from the `WorldState` before it.
+        """Execute one `Command` in an `Arena`, starting from `WorldState`.
 
         Noise is a function of `world.seed` and `world.decisions` alone (`core` `fold`): the same for every batch.
         """
@@ -53,10 +53,10 @@ class Executor:
 
 
 def find_executor(name: str) -> Executor | None:
-    """The executor of a name in the registry, or of `package.module:name`, which is imported; None: a simulated biped.
+    """The executor registered under a name, or imported from `package.module:name`; None: a simulated biped.
 
     Raises:
-      InputError: a name that is not known, with those that are; a module that cannot be imported.
+      InputError: an unknown name, with the known ones; a module that cannot be imported.
     """
     from jaxbiped.mission import executors  # noqa: F401  registers those that are built in
 
@@ -72,10 +72,10 @@ WANTED |= {name: ((), "b") for name in ("collided", "fell", "outside")}
 
 
 def execution_of(executor: Executor, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
-    """What an executor makes of a command, checked. What is no distance or no time becomes a pose that is not finite.
+    """Run an executor's command and check the result. An invalid distance or time becomes a pose that is not finite.
 
     Raises:
-      InputError: something that is not the execution of one robot.
+      InputError: a result that is not the execution of one robot.
     """
     made = executor.execute(arena, world, command, settings)
     where = f"executor {type(executor).__name__}"
@@ -87,13 +87,13 @@ def execution_of(executor: Executor, arena: Any, world: Any, command: Any, setti
         found = jnp.shape(value), np.dtype(jnp.result_type(value)).kind
         if found != (shape, kind):
             wanted = f"{'truth values' if kind == 'b' else 'real numbers'} of shape {list(shape)}"
-            message = f"gave {jnp.result_type(value)}{list(found[0])} where {wanted} are wanted"
+            message = f"gave {jnp.result_type(value)}{list(found[0])} where {wanted} are required"
             raise InputError(message, field=f"{where}: {name}")
     from jaxbiped.mission.executors import Kinematic, Sampled
 
     if type(executor) in (Kinematic, Sampled):
         return made
     sane = jnp.isfinite(made.distance + made.time + made.pose.z) & (made.distance >= 0) & (made.time >= 0)
-    pose = replace(made.pose, x=jnp.where(sane, made.pose.x, jnp.nan))  # which ends the mission as `invalid`
+    pose = replace(made.pose, x=jnp.where(sane, made.pose.x, jnp.nan))  # ends the mission as `invalid`
     distance, time = (jnp.where(sane, value, 0.0) for value in (made.distance, made.time))
     return replace(made, pose=pose, distance=distance, time=time)

@@ -1,7 +1,7 @@
-"""Executors play a command in the true world; the referee's rules for a nominal one.
+"""Executors play a command in the true world; also the referee's rules for a nominal one.
 
-`kinematic` is the one that moves exactly as the primitives say; `sampled` moves as they were measured to; simulated
-bipeds are others, which are driven from the host. People may bring more (`execution.Executor`).
+`kinematic` moves exactly as the primitives say; `sampled` moves as simulated bipeds were measured to; simulated bipeds
+are driven from the host. Users may add more (`execution.Executor`).
 """
 
 from __future__ import annotations
@@ -28,12 +28,13 @@ from jaxbiped.sensing.odometry import drift
 
 @with_own_settings
 def kinematic(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
-    """Nominal displacement and time (Table 2); odometry drifts from what was walked.
+    """Nominal displacement and time (Table 2); odometry drifts with the distance walked.
 
-    Referee, from the true arena: the robot collides when a box between its foot, raised by a step, and its head, or
-    terrain above that foot, comes nearer than the body's radius to its axis. It falls when the ground where it comes to
-    stand is not at the height that the primitive steps to: a straight step over an edge, or a step up where no bump is.
-    An edge may lie up to `edge_tolerance` off, and the height may be off by `height_tolerance`.
+    Referee, from the true arena: the robot collides if a box between its foot, raised by a step, and its head, or
+    terrain above that foot, comes nearer than the body's radius to its axis. It falls if the ground where it ends up is
+    not at
+    the height that the primitive steps to: a straight step over an edge, or a step up without a bump. Edges may be
+    displaced by `edge_tolerance`, and heights may differ by `height_tolerance`.
     """
     limits = settings.limits
     cos, sin = jnp.cos(command.turn), jnp.sin(command.turn)

@@ -1,4 +1,4 @@
-"""Sensors that work on the host, for missions that are stepped there: each robot's view, measured one by one."""
+"""Sensors that run on the host, for missions that are stepped there: each robot's view, measured one by one."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from jaxbiped.sensing.view import Sightings, View
 
 @runtime_checkable
 class Eyes(Protocol):
-    """What robots that are stepped on the host see with."""
+    """The sensor of robots that are stepped on the host."""
 
     def see(
         self,
@@ -37,31 +37,31 @@ class Eyes(Protocol):
         carriage: BodyPose | None = None,
         count: int | None = None,
     ) -> tuple[View, Sightings]:
-        """What each robot of a batch measures, as `mission_step.sense` does: the same places, attitudes and seeds.
+        """The measurement of each robot of a batch, as in `mission_step.sense`: the same places, attitudes and seeds.
 
         Args:
-          carriage: [B] how each robot really holds its body; None: upright, but for a tilt that is drawn.
-          count: rows from this one on are padding, and may get anything.
+          carriage: [B] true pose of each robot's body; None: upright, except for a random tilt.
+          count: rows from this one on are padding, and may get any value.
         """
         ...
 
     def picture(self) -> Shot | None:
-        """What the last measurement looked like; None where there is no picture."""
+        """The picture of the last measurement; None if there is none."""
         ...
 
 
 class StereoEyes:
-    """The sensor `stereo` for the robots of one process; to be used, and closed, in the thread that made it."""
+    """The sensor `stereo` for the robots of one process; to be used, and closed, in the thread that created it."""
 
     def __init__(self, camera: CameraConfig, localisation: str = "landmarks"):
         """
         Args:
-          localisation: how robots know where they stand; arenas have landmarks only where it is by these.
+          localisation: how robots localise; arenas have landmarks only if it uses them.
 
         Raises:
           InputError: nothing can be rendered on this machine.
         """
-        from jaxbiped.stereo.measure import StereoSensor  # loads MuJoCo, and how it renders
+        from jaxbiped.stereo.measure import StereoSensor  # loads MuJoCo and its renderer
 
         self.sensor = StereoSensor(camera)
         self.marked, self.tracker = localisation == "landmarks", None
@@ -80,7 +80,7 @@ class StereoEyes:
         carriage: BodyPose | None = None,
         count: int | None = None,
     ) -> tuple[View, Sightings]:
-        """See `Eyes`; padding gets what the last row before it gets."""
+        """See `Eyes`; padding gets the values of the last row before it."""
         placing = jax.device_get((where(world, mind, settings, carriage), mind.belief.pose, settings.stereo.max_range))
         arena, spread = jax.device_get((arena, settings.landmarks))
         if not self.marked:
@@ -104,17 +104,17 @@ class StereoEyes:
         return self.last
 
     def close(self) -> None:
-        """Free what the graphics driver holds."""
+        """Free the resources of the graphics driver."""
         self.sensor.close()
 
 
 def eyes_for(config: MissionConfig) -> StereoEyes | None:
-    """What a mission of this config sees with on the host; None where its sensor is JAX."""
+    """The host sensor of missions with this config; None if their sensor is in JAX."""
     return StereoEyes(config.camera, config.localisation) if config.sensor in RENDERED else None
 
 
 def try_eyes(config: MissionConfig) -> None:
-    """Refuse, before anything is printed or written, a sensor that does not work on this machine.
+    """Reject, before anything is printed or written, a sensor that does not work on this machine.
 
     Raises:
       InputError: nothing can be rendered here.
@@ -125,8 +125,8 @@ def try_eyes(config: MissionConfig) -> None:
 
 @jax.jit
 def view_names(world: WorldState, mind: AgentState) -> tuple[UInt32[Array, "B 6"], UInt32[Array, "B 6"]]:
-    """What tells this view of each robot from all others of its arena, and what told the view before it; zeros before
-    the first. Views of two missions that have the same name are the same."""
+    """Identifiers of this view of each robot within its arena, and of the view before it; zeros before the first. Views
+    of two missions with the same identifier are the same."""
 
     def name(pose: Pose, decision: Int[Array, ""], look: Bool[Array, ""], squat: Bool[Array, ""], seed) -> Array:
         held = 2 * look.astype(jnp.uint32) + squat.astype(jnp.uint32)
@@ -146,7 +146,7 @@ def view_names(world: WorldState, mind: AgentState) -> tuple[UInt32[Array, "B 6"
 def where(
     world: WorldState, mind: AgentState, settings: MissionParams, carriage: BodyPose | None
 ) -> tuple[Float[Array, "B 3"], Float[Array, "B 3 3"], Mount, UInt32[Array, "B"]]:
-    """Each robot's left camera, truly: its centre [m] and its axes; where it is believed to sit; the view's seed."""
+    """Each robot's true left camera: its centre [m] and its axes; its believed position; the view's seed."""
 
     def one(world, mind, settings, carriage):
         seed = fold(world.seed, SENSE, world.decisions)

@@ -1,4 +1,4 @@
-"""Where the feet go: what a robot measures of the edges on its way, remembers of them, and makes of its command."""
+"""Foot placement: the edges that a robot measures on its way and remembers, and their effect on its command."""
 
 from __future__ import annotations
 
@@ -19,9 +19,7 @@ from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.edges import Edge
 from jaxbiped.sensing.view import View
 
-SIDEWAYS = (
-    0.1  # [m] to the side of the robot's own way, up to which the piece of an edge is measured that its path crosses
-)
+SIDEWAYS = 0.1  # [m] lateral range around the robot's path within which a crossed edge is measured
 
 
 def place_feet(
@@ -35,7 +33,7 @@ def place_feet(
     settings: MissionParams,
     program: MissionSpec,
 ) -> tuple[AgentState, Command]:
-    """The command, or what it takes first for the feet to stand right before the next edge; and what is known of that.
+    """The command, or the one needed first to place the feet before the next edge; and the memory of edges.
 
     One robot. `directions` are the first `motion.edge_approach.foresight` moves of its path.
     """
@@ -48,7 +46,7 @@ def place_feet(
     command = approach(
         command, pose, ij, crossing, ahead, mind.ahead, mind.behind, classes, levels, mind.look, settings.footing, spec
     )
-    # An edge that the path has left is still there.
+    # An edge that the path has left still exists.
     left = ~crossing.edge.known & mind.ahead.known & (mind.ahead.distance > 0)
     ahead = jax.tree.map(lambda new, old: jnp.where(left, old, new), ahead, mind.ahead)
     return replace(mind, ahead=ahead), command
@@ -57,14 +55,14 @@ def place_feet(
 def look_for(
     about: Edge, crossing: Crossing, mind: AgentState, view: View, settings: MissionParams, program: MissionSpec
 ) -> Edge:
-    """The edge near the line `about`, as the present view has it; known only where the path crosses one.
+    """The edge near the line `about` according to the present view; known only if the path crosses one.
 
-    The map knows its direction but roughly, so that it is looked for along the edge behind as well: the sides of most
-    bumps are parallel.
+    The map knows its direction only roughly, so the edge is also searched along the direction of the edge behind: the
+    sides of most bumps are parallel.
     """
     spec = program.spec
     flat = mapping.level_view(view, mind.belief.pose.z, settings.mapping, spec) if not program.knows_pose else view
-    flat = jax.lax.optimization_barrier(flat)  # else the plane is fitted anew at every point
+    flat = jax.lax.optimization_barrier(flat)  # otherwise the plane is fitted again at every point
     eye, aside = mount(settings.camera, mind.look, mind.squat), jnp.clip(crossing.along, -SIDEWAYS, SIDEWAYS)
     turned = wrap_angle(mind.behind.angle - about.angle)
     distance = about.distance * jnp.cos(turned) + crossing.along * jnp.sin(turned)
@@ -76,7 +74,7 @@ def look_for(
 
 
 def walked(mind: AgentState, command: Command, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
-    """What the robot knows of the edges about it after a command, by odometry: what was ahead may now be behind."""
+    """Update the edges known to the robot after a command, by odometry: an edge ahead may now be behind."""
     ahead, behind = (edges.predict(edge, moved, variances) for edge in (mind.ahead, mind.behind))
     stepped = command.rise != 0
     behind = jax.tree.map(lambda a, b: jnp.where(stepped, a, b), ahead, behind)

@@ -10,16 +10,16 @@ from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning import Rules
 from jaxbiped.planning.costs import FORBIDDEN, cell_kinds
 
-MARGIN = 0.02  # [m] a robot that stands this far off the cell's centre shall still be within the goal's circle
+MARGIN = 0.02  # [m] a robot this far from the cell's centre must still be within the goal's circle
 
 
 def goal_cell(
     goal_xy: Float[Array, "2"], radius: Float[Array, ""], classes: Int[Array, "H W"], rules: Rules, spec: GridSpec
 ) -> Int[Array, "2"]:
-    """Of the cells whose centre lies well within `radius` [m] of the goal, the nearest that is not blocked.
+    """Of the cells whose centre is well within `radius` [m] of the goal, the nearest that is not blocked.
 
-    The goal is reached within a circle (paper, 3.1), so that a wall beside it must not close it. Where all are
-    blocked, the cell that holds the goal.
+    The goal is reached within a circle (paper, 3.1), so a wall beside it must not block it. If all are blocked, the
+    cell that contains the goal.
     """
     rows, columns = jnp.arange(spec.shape[0]), jnp.arange(spec.shape[1])
     dx, dy = (columns + 0.5) * spec.pitch - goal_xy[0], (rows + 0.5) * spec.pitch - goal_xy[1]

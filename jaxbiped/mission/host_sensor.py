@@ -30,13 +30,13 @@ class HostSensor(Sensor):
 
     - `arena`: an `Arena` of NumPy arrays: `arena.boxes.x`, `arena.size_xy` and so on.
     - `pose`: the true x, y, z [m] and yaw [rad]; z is the height of the ground under the robot.
-    - `looks_down`, `squat`: truth values.
+    - `looks_down`, `squat`: booleans.
     - `rng`: a `numpy.random.Generator`, the same for the same measurement of the same mission.
     - `points`: [n, 3] in the robot frame [m] (x forward, y left, z up from the ground under it), or [n, 4] with the
-      pixels that each stands for (1 by default); at most as many as `points` of this object.
+      number of pixels of each (1 by default); at most as many as `points` of this object.
 
     A function that raises an error, or returns anything else, ends its mission as `invalid`; the first such error of a
-    process is told on stderr. Arenas have no terrain; boxes that move are where they are at that moment.
+    process is reported on stderr. Arenas have no terrain; moving boxes are at their positions of that moment.
     """
 
     function: ViewFunction = field(metadata={"static": True})
@@ -73,7 +73,7 @@ CALLERS: dict = {}
 
 
 def caller(function: ViewFunction, points: int, structure, shapes: tuple, flags: tuple) -> Callable:
-    """What the compiled program calls, for a batch of any leading axes; the same one for the same arguments."""
+    """The function that the compiled program calls, for any batch axes; the same one for the same arguments."""
     key = function, points, structure, shapes, flags
     if key not in CALLERS:
 
@@ -94,7 +94,7 @@ def caller(function: ViewFunction, points: int, structure, shapes: tuple, flags:
 
 
 def measured(function: ViewFunction, points: int, arena, pose, looks_down, squat, rng) -> np.ndarray:
-    """Columns x, y, z and weight [4, points] of one measurement; NaN where the function failed."""
+    """Columns x, y, z and weight [4, points] of one measurement; NaN if the function failed."""
     columns = np.zeros((4, points), np.float32)
     try:
         made = np.asarray(function(arena, tuple(map(float, pose)), looks_down, squat, rng), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""What simulation measured of each primitive, as the executor `sampled` reads it."""
+"""Primitives as measured in simulation, as read by the executor `sampled`."""
 
 from __future__ import annotations
 
@@ -21,35 +21,35 @@ DEFAULT = Path(__file__).with_name("library.toml")
 PLAYED = ("straight", "turn", "step_up", "step_down", "squat_straight", "sidestep")
 """The primitives that displace the robot, in the order of the arrays of `Library`."""
 STEPS = ("step_up", "step_down")
-SMALLEST = 1e-12  # added to variances, so that what never varied has a square root
+SMALLEST = 1e-12  # added to variances, so that zero variances have a Cholesky factor
 
 
 class Window(Model):
-    """How a step over an edge ends by where the edge is. Every combination was tried, undisturbed otherwise."""
+    """How a step over an edge ends, by the position of the edge. Every combination was tried, otherwise undisturbed."""
 
     ahead: float
-    """[m] from the middle between the feet to the edge, where it should be."""
+    """[m] Nominal distance from the midpoint of the feet to the edge."""
     edge: Annotated[tuple[float, ...], pydantic.Field(min_length=2)]
-    """[m] that the edge is further away than where it should be, rising."""
+    """[m] Distances of the edge beyond the nominal one, ascending."""
     yaw: Annotated[tuple[float, ...], pydantic.Field(min_length=2)]
-    """[rad] that it is turned anticlockwise from square, rising."""
+    """[rad] Anticlockwise rotations of the edge from perpendicular, ascending."""
     stands: tuple[tuple[Annotated[float, pydantic.Field(ge=0.0, le=1.0)], ...], ...]
-    """Share of the trials that did not fall; a row an edge, a column a yaw."""
+    """Share of the trials that did not fall; one row per edge, one column per yaw."""
 
     @pydantic.model_validator(mode="after")
     def _shape(self):
         if len(self.stands) != len(self.edge) or any(len(row) != len(self.yaw) for row in self.stands):
-            raise ValueError("stands must have a row for each edge and a column for each yaw")
+            raise ValueError("stands must have one row per edge and one column per yaw")
         if any(np.any(np.diff(axis) <= 0) for axis in (self.edge, self.yaw)):
-            raise ValueError("edge and yaw must rise")
+            raise ValueError("edge and yaw must be ascending")
         return self
 
 
 class Rims(Model):
-    """Where an edge that a primitive does not step over may lie: [m] from the middle of the nearest sole, where the
-    robot comes to stand, outwards: ahead of it, or to its outer side. Nearer than that it falls.
+    """Where an edge that a primitive does not step over may lie: [m] outwards from the middle of the nearest sole at
+    the robot's final position, ahead of it or to its outer side. The robot falls if it is nearer.
 
-    A rise whose edge is further ahead than that stops the toes, and the robot stands short; it does not fall.
+    A rise whose edge is farther ahead stops the toes, and the robot ends short; it does not fall.
     """
 
     up_ahead: float
@@ -59,21 +59,21 @@ class Rims(Model):
 
 
 class Feet(Model):
-    """Of the robot that was verified."""
+    """The feet of the verified robot."""
 
     length: Annotated[float, pydantic.Field(gt=0.0)]
     """[m]"""
     width: Annotated[float, pydantic.Field(gt=0.0)]
     """[m]"""
     offset: Annotated[float, pydantic.Field(gt=0.0)]
-    """[m] of each sole's middle to the side."""
+    """[m] Lateral offset of each sole's middle."""
 
 
 class Entry(Model):
     """One primitive on the mild set."""
 
     request: Three
-    """(forward, left) [m] and turn [rad] asked for."""
+    """Requested (forward, left) [m] and turn [rad]."""
     rise: float
     """[m]"""
     duration: Annotated[float, pydantic.Field(gt=0.0)]
@@ -81,15 +81,15 @@ class Entry(Model):
     trials: Annotated[int, pydantic.Field(gt=0)]
     falls: Count
     slips: Count
-    """Trials that ended upright, but not where they should."""
+    """Trials that ended upright, but in the wrong place."""
     touches: Count
     """Trials in which head or torso touched something."""
     displacement: Three
-    """Mean of where it ended [m, m, rad], in the frame of the start, of the trials that did not fall."""
+    """Mean end pose [m, m, rad] in the start frame, over the trials that did not fall."""
     covariance: tuple[Three, Three, Three]
-    """Of the same."""
+    """Covariance of the same."""
     sway: Annotated[float, pydantic.Field(ge=0.0)]
-    """[m] furthest that the head's middle came to the side of the way."""
+    """[m] Largest lateral excursion of the head's middle."""
     window: Window | None = None
 
     @pydantic.model_validator(mode="after")
@@ -102,7 +102,7 @@ class Entry(Model):
 
 
 class LibraryConfig(Model):
-    """What `jaxbiped primitives` measured."""
+    """Measurements of `jaxbiped primitives`."""
 
     command: str
     """The command line that wrote it."""
@@ -116,7 +116,7 @@ class LibraryConfig(Model):
     def _complete(self):
         missing = [name for name in PLAYED if name not in self.primitives]
         if missing:
-            raise ValueError(f"missions play {', '.join(missing)} too; verify all primitives")
+            raise ValueError(f"missions also play {', '.join(missing)}; verify all primitives")
         for name in STEPS:
             if self.primitives[name].window is None:
                 raise ValueError(f"{name} needs its window")
@@ -126,7 +126,7 @@ class LibraryConfig(Model):
         return self
 
     def traced(self) -> Library:
-        """As arrays."""
+        """The library as arrays."""
         entries = [self.primitives[name] for name in PLAYED]
         windows = [self.primitives[name].window for name in STEPS]
         covariances = np.array([entry.covariance for entry in entries]) + SMALLEST * np.eye(3)
@@ -149,7 +149,7 @@ class LibraryConfig(Model):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Library:
-    """`LibraryConfig`, traced; the first axis is that of `PLAYED`, of `stands` that of `STEPS`."""
+    """`LibraryConfig`, traced; the first axis is that of `PLAYED`, for `stands` that of `STEPS`."""
 
     request: Float[Array, "*B 6 3"]  # [m, m, rad]
     bias: Float[Array, "*B 6 3"]  # mean displacement minus the request
@@ -158,17 +158,17 @@ class Library:
     sway: Float[Array, "*B 6"]  # [m]
     feet: Float[Array, "*B 3"]  # [m] length, width, offset
     rims: Float[Array, "*B 4"]  # [m] up ahead, up aside, down ahead, down aside
-    ahead: Float[Array, "*B 2"]  # [m] where edges should be
-    edge: Float[Array, "*B E"]  # [m] of the windows, further away than that
+    ahead: Float[Array, "*B 2"]  # [m] nominal distance of edges
+    edge: Float[Array, "*B E"]  # [m] of the windows, beyond the nominal distance
     yaw: Float[Array, "*B Y"]  # [rad]
     stands: Float[Array, "*B 2 E Y"]  # probability
 
 
 @functools.lru_cache(maxsize=8)
 def load_library(path: Path | None = None) -> LibraryConfig:
-    """The library of a file that `jaxbiped primitives` wrote; the shipped one where None.
+    """The library in a file written by `jaxbiped primitives`; the shipped one if None.
 
     Raises:
-      InputError: no such file, or none of a library.
+      InputError: the file does not exist, or is not a library.
     """
     return load(LibraryConfig, path or DEFAULT)

@@ -1,6 +1,6 @@
-"""Where a robot believes to stand after a measurement: by landmarks, as in the paper, or without any.
+"""The believed pose of a robot after a measurement: from landmarks, as in the paper, or without them.
 
-One robot; `decision.perceive` maps it.
+Written for one robot; `decision.perceive` maps it.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def localise(
     settings: MissionParams,
     program: MissionSpec,
 ) -> AgentState:
-    """The mind after what a view tells of the robot's pose."""
+    """The mind after a view has updated the robot's pose."""
     if program.localisation == "landmarks":
         return replace(mind, belief=correct(mind.belief, landmarks, sightings))
     if program.localisation in VISUAL:
@@ -46,7 +46,7 @@ def localise(
 
 
 def by_motion(mind: AgentState, sightings: Sightings) -> Belief:
-    """The belief where the motion since the last view was seen; that of dead reckoning where it was not."""
+    """The belief from visual motion since the last view if it was measured; otherwise from dead reckoning."""
     anchor, motion = mind.anchor, sightings.motion
     belief, good = predict_seen(anchor.belief, anchor.moved, anchor.variances, motion)
     good = good & anchor.some
@@ -55,7 +55,7 @@ def by_motion(mind: AgentState, sightings: Sightings) -> Belief:
 
 
 def by_walls(mind: AgentState, view: View, settings: MissionParams, program: MissionSpec) -> AgentState:
-    """The mind after the walls in view were laid onto those measured before, and were kept with them."""
+    """The mind after the walls in view were matched to those measured before, and added to them."""
     spec, image = program.spec, program.image
     flat = jax.lax.optimization_barrier(level_view(view, mind.belief.pose.z, settings.mapping, spec))
     shape, step = picture_shape(view.x.shape[-1], image.width, image.height)
@@ -85,9 +85,9 @@ def unmarked(
     program: MissionSpec,
     seed: UInt32[Array, ""],
 ) -> Sightings:
-    """What a robot without landmarks sees of its own motion, as the ray-cast sensor has it.
+    """The motion that a robot without landmarks measures, according to the ray-cast sensor.
 
-    Deviation: of a simulated biped the motion is that of its feet, whatever its body does over them.
+    Deviation: for a simulated biped this is the motion of its feet, regardless of its body.
     """
     zero = jnp.zeros_like(arena.landmarks.x)
     none = Sightings(zero, zero, zero, zero > 0)

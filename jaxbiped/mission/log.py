@@ -1,4 +1,4 @@
-"""What one mission looked like, step by step, on the host: for pictures, films and printed logs. Plain NumPy."""
+"""The record of one mission, step by step, on the host: for pictures, films and printed logs. Plain NumPy."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int8, UInt8
 
-SHORTEST = 1e-3  # [m] a shorter way is none, as in `arenas.moving_boxes`
+SHORTEST = 1e-3  # [m] a shorter path counts as none, as in `arenas.moving_boxes`
 KINDS = ("obstacle", "bump", "gate")  # of an outline
 MARKS = ("circle", "square")  # of a landmark
 
@@ -24,7 +24,7 @@ class Outline:
     way: tuple[float, float, float, float] | None = None  # if it moves: dx, dy, speed, phase of `arenas.moving_boxes`
 
     def moved(self, time: float) -> tuple[float, float]:
-        """How far (x, y) [m] it is from its corners at a time [s] of the mission."""
+        """Its displacement (x, y) [m] from its corners at a time [s] of the mission."""
         if self.way is None:
             return 0.0, 0.0
         dx, dy, speed, phase = self.way
@@ -38,13 +38,13 @@ class Mark:
     """One landmark on the floor."""
 
     xy: tuple[float, float]  # [m] centre
-    yaw: float  # [rad]; of no meaning for a circle
+    yaw: float  # [rad]; meaningless for a circle
     kind: str  # one of MARKS
 
 
 @dataclass(frozen=True)
 class Ground:
-    """True terrain, as `geometry.height_field.HeightField`."""
+    """True terrain, as in `geometry.height_field.HeightField`."""
 
     heights: Float32[np.ndarray, "P Q"]  # [m]; NaN in holes
     origin_xy: Float[np.ndarray, "2"]  # [m] of heights[0, 0]
@@ -53,7 +53,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class Picture:
-    """What one measurement looked like."""
+    """The picture of one measurement."""
 
     left: UInt8[np.ndarray, "h w 3"]  # the left camera's image
     disparity: Float32[np.ndarray, "h w"]  # [px]; 0 where nothing was measured
@@ -69,33 +69,33 @@ class Walk:
 
 @dataclass(frozen=True)
 class MissionLog:
-    """`T` moments of one mission: the first before anything is done, then one after each action.
+    """`T` moments of one mission: the first before any action, then one after each action.
 
-    `classes`, `levels` and `plan` are what the robot believed at the moment, in the world frame.
+    `classes`, `levels` and `plan` are what the robot believed at that moment, in the world frame.
     """
 
     classes: Int8[np.ndarray, "T H W"]  # `Cell` of each cell
     levels: Int8[np.ndarray, "T H W"]  # level of the ground
-    true_xyyaw: Float[np.ndarray, "T 3"]  # [m, m, rad] where the robot was
-    estimated_xyyaw: Float[np.ndarray, "T 3"]  # [m, m, rad] where it believed to be
+    true_xyyaw: Float[np.ndarray, "T 3"]  # [m, m, rad] true pose
+    estimated_xyyaw: Float[np.ndarray, "T 3"]  # [m, m, rad] believed pose
     plan: tuple[Float[np.ndarray, "n 2"], ...]  # T paths ahead [m], each from 0 points (no path) up
     time: Float[np.ndarray, "T"]  # [s] since the start
-    action: tuple[str, ...]  # T names of what was done just before, "Start" for the first
+    action: tuple[str, ...]  # T names of the preceding actions, "Start" for the first
     pitch: float  # [m]
     origin_xy: Float[np.ndarray, "2"]  # [m] outer corner of cell (0, 0)
     size_xy: Float[np.ndarray, "2"]  # [m] of the arena, from (0, 0)
     goal_xy: Float[np.ndarray, "2"]  # [m]
     outlines: tuple[Outline, ...] = ()  # true boxes
     landmarks: tuple[Mark, ...] = ()
-    pictures: tuple[Picture, ...] = ()  # T of what the map was measured by last; none where no camera was rendered
-    outcome: str = ""  # how it ended, "reached" say
+    pictures: tuple[Picture, ...] = ()  # T pictures of the last measurements; none without a rendered camera
+    outcome: str = ""  # how it ended, such as "reached"
     true_z: Float[np.ndarray, "T"] | None = None  # [m] height of the ground that the robot stood on
     squat: Bool[np.ndarray, "T"] | None = None  # its stance
-    seen: Int[np.ndarray, "T"] | None = None  # landmarks that were seen by the last measurement
-    points: tuple[Float32[np.ndarray, "_ 3"], ...] = ()  # T clouds [m] that were measured last, world as believed
+    seen: Int[np.ndarray, "T"] | None = None  # landmarks seen in the last measurement
+    points: tuple[Float32[np.ndarray, "_ 3"], ...] = ()  # T clouds [m] of the last measurements, believed world frame
     voxels: Bool[np.ndarray, "T H W Z"] | None = None  # occupied; k: (k - 1/2) to (k + 1/2) `level_height`
     level_height: float = 0.03  # [m]
-    walk: Walk | None = None  # of a biped that was simulated
+    walk: Walk | None = None  # of a simulated biped
     terrain: Ground | None = None
 
     def __post_init__(self):

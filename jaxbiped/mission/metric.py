@@ -1,4 +1,5 @@
-"""Metrics: numbers that each mission has beside its code, and what one is; those that people bring are like these."""
+"""Metrics: numbers of each mission besides its code, and their base class; users' metrics work like the built-in
+ones."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from jaxbiped.core.component import as_component
 from jaxbiped.core.registry import METRICS
 from jaxbiped.errors import InputError
 
-NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")  # a column's
+NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")  # of a column
 
 
 @jax.tree_util.register_dataclass
@@ -27,8 +28,8 @@ class Step:
 
     arena: Any  # `Arena`
     before: Any  # `WorldState` when the robot decided
-    after: Any  # `WorldState` after what it did
-    command: Any  # `Command` that it gave
+    after: Any  # `WorldState` after its action
+    command: Any  # `Command` its command
     played: Bool[Array, "*B"]  # False: the mission ended with this decision, and the robot stayed
     settings: Any  # `MissionParams` of the mission
 
@@ -45,47 +46,47 @@ class MissionEnd:
 
 
 class MetricFormat(Model):
-    """How a metric's numbers are shown, as it is stored with them: who reads them may not have the metric."""
+    """How a metric's numbers are displayed, stored with them since readers may not have the metric."""
 
     unit: Annotated[str, pydantic.Field(max_length=40, pattern=r"^[^$\x00-\x1f]*$")] = ""
-    """without `$`, by which formulas would begin in figures"""
+    """without `$`, which would start formulas in figures"""
     scale: Annotated[float, pydantic.Field(allow_inf_nan=False)] = 1.0
-    """from SI to that unit"""
+    """factor from SI to that unit"""
     digits: Annotated[int, pydantic.Field(ge=0, le=12)] = 2
-    """after the point"""
+    """digits after the decimal point"""
     smaller_is_better: bool = True
 
 
 class Metric:
-    """The base of metrics: a frozen dataclass that is a pytree, as planners are.
+    """Base class of metrics: a frozen dataclass that is a pytree, like planners.
 
-    It is written for one mission. What it must remember on the way is a pytree of arrays, by default nothing.
+    It is written for one mission. Its state during the mission is a pytree of arrays, by default empty.
     """
 
-    unit: ClassVar[str] = ""  # that people are shown it in
-    scale: ClassVar[float] = 1.0  # from SI to that unit
-    digits: ClassVar[int] = 2  # after the point
+    unit: ClassVar[str] = ""  # unit for display
+    scale: ClassVar[float] = 1.0  # factor from SI to that unit
+    digits: ClassVar[int] = 2  # digits after the decimal point
     smaller_is_better: ClassVar[bool] = True
     of_servos: ClassVar[bool] = False  # whether its state is the work [J] of a simulated biped, which its driver writes
 
     def start(self, arena: Any, settings: Any) -> Any:
-        """What it remembers before the first decision in an `Arena`."""
+        """The state before the first decision in an `Arena`."""
         return ()
 
     def update(self, state: Any, step: Step) -> Any:
-        """The same after a decision: of the same shapes and types."""
+        """The state after a decision, with the same shapes and types."""
         return state
 
     def result(self, state: Any, end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
-        """The number, and whether there is one: for "fell on the way" there may be none."""
+        """The number, and whether there is one: if the robot fell on the way there may be none."""
         raise NotImplementedError(f"{type(self).__name__} has no method `result`")
 
 
 def as_metric(thing: object, name: str) -> Metric:
-    """A metric of something that stands for one: a metric or its class.
+    """The metric given as an object or as its class.
 
     Raises:
-      InputError: anything else, or a name that no column can have.
+      InputError: anything else, or a name that is not valid for a column.
     """
     if not NAME.fullmatch(name):
         message = "must begin with a small letter and have at most 40 small letters, digits and _"
@@ -94,7 +95,7 @@ def as_metric(thing: object, name: str) -> Metric:
 
 
 def format_of(metric: Metric, name: str) -> MetricFormat:
-    """How the numbers of a metric are shown.
+    """How the numbers of a metric are displayed.
 
     Raises:
       InputError: a unit, scale or number of digits that is not valid.
@@ -105,33 +106,33 @@ def format_of(metric: Metric, name: str) -> MetricFormat:
 
 
 def find_metric(name: str) -> Metric:
-    """The metric of a name in the registry, or of `package.module:name`, which is imported.
+    """The metric registered under a name, or imported from `package.module:name`.
 
     Raises:
-      InputError: a name that is not known, with those that are; a module that cannot be imported.
+      InputError: an unknown name, with the known ones; a module that cannot be imported.
     """
     from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
 
     found = METRICS.find(name, lambda thing, own: as_metric(thing, column_of(f":{own}")))
     column = column_of(name)
-    return found if column in METRICS else METRICS.add(column, found)  # tables and figures ask for its unit
+    return found if column in METRICS else METRICS.add(column, found)  # tables and figures need its unit
 
 
 def column_of(name: str) -> str:
-    """The column of a metric in rows: its name, without the module that it comes from; `slow_walk` of `SlowWalk`."""
+    """The column of a metric in rows: its name without its module; `slow_walk` for `SlowWalk`."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.rpartition(":")[2]).lower() if ":" in name else name
 
 
 def begun(metrics: tuple[Metric, ...], arena: Any, settings: Any) -> tuple:
-    """What each metric remembers at the start of one mission."""
+    """The state of each metric at the start of one mission."""
     return tuple(jax.tree.map(jnp.asarray, metric.start(arena, settings)) for metric in metrics)
 
 
 def updated(metrics: tuple[Metric, ...], states: tuple, step: Step) -> tuple:
-    """The same after a decision.
+    """The states after a decision.
 
     Raises:
-      InputError: a metric whose memory changes its shapes or types.
+      InputError: a metric whose state changes its shapes or types.
     """
     found = []
     for metric, state in zip(metrics, states, strict=True):
@@ -154,7 +155,7 @@ def numbers_at_end(metrics: tuple[Metric, ...], states: tuple, end: MissionEnd) 
     """(value, valid) of each metric for one mission.
 
     Raises:
-      InputError: a result that is not one number and one truth value.
+      InputError: a result that is not one number and one boolean.
     """
     found = []
     for metric, state in zip(metrics, states, strict=True):
@@ -164,7 +165,7 @@ def numbers_at_end(metrics: tuple[Metric, ...], states: tuple, end: MissionEnd) 
             raise InputError("its result must be (value, valid)", field=name, value=type(made).__name__)
         for part, kinds in zip(made, ("fiu", "b"), strict=True):
             if jnp.shape(part) != () or np.dtype(jnp.result_type(part)).kind not in kinds:
-                message = f"its result is {described(made)} where one number and one truth value are wanted"
+                message = f"its result is {described(made)} where one number and one boolean are required"
                 raise InputError(message, field=name)
         found.append((jnp.asarray(made[0], jnp.float32), jnp.asarray(made[1])))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""The metrics that are built in, beside success, distance and time."""
+"""The built-in metrics, in addition to success, distance and time."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from jaxbiped.mission.outcome import Code
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class PathEfficiency(Metric):
-    """Success weighted by path length (SPL): the oracle plan's length by that walked, at most 1; 0 for a failure.
+    """Success weighted by path length (SPL): length of the oracle plan over that walked, at most 1; 0 for a failure.
 
     Anderson et al., "On Evaluation of Embodied Navigation Agents" (2018). Deviation: the shortest path is the plan of
-    least cost with perfect knowledge, for the same strategy. There is none where a robot arrived without such a plan.
+    lowest cost with perfect knowledge, for the same strategy. It is missing if a robot arrived without such a plan.
     """
 
     digits = 3
@@ -39,10 +39,10 @@ class PathEfficiency(Metric):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class LeastClearance(Metric):
-    """[m] how near the body came to a box that stood between its raised foot and its head; below 0 where they met.
+    """[m] Smallest distance of the body from a box between its raised foot and its head; negative on contact.
 
-    It is looked at a third, two thirds and the end of each step, as the referee does. Terrain does not count. There is
-    none where no such box was, nor in arenas with boxes that move.
+    It is evaluated at a third, two thirds and the end of each step, like the referee's check. Terrain does not count.
+    It is missing if there was no such box, and in arenas with moving boxes.
     """
 
     unit, scale, digits = "cm", 100.0, 1
@@ -72,7 +72,7 @@ class LeastClearance(Metric):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Replans(Metric):
-    """How often a plan was made anew: plans but the first. There is none where none was made."""
+    """Number of plans after the first. It is missing if no plan was made."""
 
     digits = 1
 
@@ -99,10 +99,10 @@ class MeasuringShare(Metric):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Energy(Metric):
-    """[J] mechanical work of the servos of a simulated biped: force times velocity, summed over the engine's steps.
+    """[J] Mechanical work of the servos of a simulated biped: force times velocity, summed over the engine's steps.
 
-    What a servo takes while it brakes is not got back, and heat is not counted. It is of the motions as they are played
-    (`walk.pace`), not of the clock. There is none where no biped is simulated.
+    Work absorbed while braking is not recovered, and heat is not counted. It is that of the motions as played
+    (`walk.pace`), not of the clock. It is missing if no biped is simulated.
     """
 
     unit, digits = "J", 1

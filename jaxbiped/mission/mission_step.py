@@ -40,12 +40,12 @@ def step(
     program: MissionSpec,
     seen: tuple[View, Sightings] | None = None,
 ) -> tuple[WorldState, AgentState, View, Command, DecisionTrace]:
-    """Every mission of the batch, one decision on. Missions that have ended do not change.
+    """Advance every mission of the batch by one decision. Missions that have ended do not change.
 
     Consumes channels SENSE and ODOMETRY of each mission's seed, counted by its decisions.
 
     Args:
-      seen: what each robot has just measured; None: measure here, by a sensor that is JAX.
+      seen: what each robot has just measured; None: measure here, with a sensor in JAX.
     """
     view, thinking, command, verdict, thought = sense_and_decide(world, mind, arena, settings, program, seen=seen)
     executed = carry_out(arena, world, command, settings, program)
@@ -60,7 +60,7 @@ def step(
 def carry_out(
     arena: Arena, world: WorldState, command: Command, settings: MissionParams, program: MissionSpec
 ) -> Execution:
-    """What comes of the command of each robot, among boxes that stand and boxes that move."""
+    """Execute the command of each robot, among standing and moving boxes."""
     play = jax.vmap(played)
     if arena.movers is None:
         return play(arena, world, command, settings)
@@ -70,7 +70,7 @@ def carry_out(
 
 
 def played(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
-    """What comes of the command of one robot."""
+    """Execute the command of one robot."""
     return execution_of(settings.executor, arena, world, command, settings)
 
 
@@ -86,14 +86,13 @@ def sense_and_decide(
     """Sense and decide, for a batch: the view, and what `decide` returns. Consumes channel SENSE.
 
     Args:
-      carriage: [B] how each robot really holds its body; None: upright where it stands, but for a tilt that the
-        sensor draws.
+      carriage: [B] true pose of each robot's body; None: upright, except for a tilt drawn by the sensor.
       seen: what each robot has just measured; None: measure here.
     """
     if seen is None:
         now = arena if arena.movers is None else jax.vmap(at_time)(arena, world.time)
         seen = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, now, settings, program, carriage)
-    # Without the barrier XLA fuses the camera into the map, and measures again for each use of a point.
+    # Without the barrier, XLA fuses the camera into the map and repeats the measurement for each use of a point.
     view, sightings = jax.lax.optimization_barrier(seen)
     if program.knows_pose:
         mind = replace(mind, belief=replace(mind.belief, pose=world.pose))
@@ -114,12 +113,12 @@ def sense(
     program: MissionSpec,
     carriage: BodyPose | None,
 ) -> tuple[View, Sightings]:
-    """What one robot measures from where it really stands, and with its body as it really holds it."""
+    """The measurement of one robot from its true position, and with the true pose of its body."""
     pose = world.pose if carriage is None else carriage.pose
     attitude = None if carriage is None else (carriage.roll, carriage.pitch)
     seed = fold(world.seed, SENSE, world.decisions)
     if settings.sensor is None:
-        raise ValueError(f"the sensor {program.sensor} measures on the host: its missions are given what they see")
+        raise ValueError(f"the sensor {program.sensor} measures on the host: its missions must be given their views")
     at = Standpoint(world.pose if program.knows_pose else pose, mind.look, world.squat, attitude, seed)
     view = view_of(settings.sensor, arena, at, settings, program)
     if program.localisation != "landmarks":
@@ -139,7 +138,7 @@ def apply_outcome(
     settings: MissionParams,
     program: MissionSpec,
 ) -> tuple[WorldState, AgentState]:
-    """One mission after its command: the robot counts its odometry, the referee looks."""
+    """Update one mission after its command: the robot integrates its odometry, the referee checks."""
     stays = verdict != Code.RUNNING
     belief = predict(mind.belief, *executed.moved, executed.variances)
     belief = replace(belief, pose=climbed(belief.pose, command.rise, program.spec))

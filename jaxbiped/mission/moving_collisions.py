@@ -1,4 +1,4 @@
-"""The referee's rule for obstacles that move: whether one of them runs into the robot, or the robot into it."""
+"""The referee's rule for moving obstacles: whether one of them hits the robot, or the robot hits it."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from jaxbiped.mission.settings import MissionParams
 from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command
 
-CHECKS = 64  # moments of a measurement and what follows it: 3 cm of an obstacle's way at 0.02 m/s and 106 s
+CHECKS = 64  # moments of a measurement and what follows it: 3 cm of an obstacle's path at 0.02 m/s and 106 s
 
 
 def met(
     arena: Arena, world: WorldState, command: Command, executed: Execution, settings: MissionParams
 ) -> Bool[Array, ""]:
-    """Whether a box that moves touches one robot while it measures, or while it carries out its command.
+    """Whether a moving box touches one robot while it measures, or while it executes its command.
 
     The robot is an upright cylinder of the body's radius, from a step above its ground to its head. It stands while it
-    measures, and then goes straight, and at constant speed, to where it ends: turns take their time on the way.
+    measures, and then moves straight and at constant speed to its end position: time for turns is spread over the path.
     """
     if arena.movers is None:
         return jnp.zeros((), bool)

@@ -1,6 +1,6 @@
 """The oracle plan: what each strategy could do with perfect knowledge.
 
-It tells failures of sensing from failures of planning, and an arena that cannot be solved from one that was not.
+It distinguishes failures of sensing from failures of planning, and unsolvable arenas from unsolved ones.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from jaxbiped.motion.selection import cell_of
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class OraclePlan:
-    """For each of the settings and each arena."""
+    """Oracle plans for each of the settings and each arena."""
 
     reachable: Bool[Array, "P A"]
-    cost: Float[Array, "P A"]  # of Eq. (1), from the start's cell to the goal's; inf where there is no path
-    length: Float[Array, "P A"]  # [m] of that path, between cell centres; NaN where it is none or very long
+    cost: Float[Array, "P A"]  # of Eq. (1), from the start's cell to the goal's; inf if there is no path
+    length: Float[Array, "P A"]  # [m] of that path, between cell centres; NaN if there is none or it is very long
 
 
 @with_own_settings
@@ -40,8 +40,8 @@ class OraclePlan:
 def oracle_plan(arenas: Arena, settings: MissionParams, program: MissionSpec) -> OraclePlan:
     """Plans on the true class grid of each arena [A], under each of the settings [P].
 
-    Boxes that move are left out. `blind_stop` has one way, the one that it plans on an empty floor; its goal is
-    reachable when that way is floor.
+    Moving boxes are left out. `blind_stop` has one path, the one that it plans on an empty floor; its goal is reachable
+    if that path is all floor.
     """
     arenas, spec = jax.vmap(partial(only, moving=False))(arenas), program.spec
     start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(arenas.start_xyyaw[:, 0], arenas.start_xyyaw[:, 1], spec)
@@ -57,7 +57,7 @@ def oracle_plan(arenas: Arena, settings: MissionParams, program: MissionSpec) ->
     first_grids = grids(first_body)
 
     def plan(setting: MissionParams) -> tuple[Float[Array, "A"], Float[Array, "A"]]:
-        # Most studies sweep anything but the body: its true grids are made once.
+        # Most studies do not sweep the body: then true grids are made once.
         same = jnp.all(jnp.stack(jax.tree.leaves(jax.tree.map(jnp.equal, setting.body, first_body))))
         classes, levels = jax.lax.cond(same, lambda: first_grids, lambda: grids(setting.body))
         costs, rules = setting.costs.at_pitch(spec.pitch), setting.strategy.rules()
@@ -73,7 +73,7 @@ def oracle_plan(arenas: Arena, settings: MissionParams, program: MissionSpec) ->
         steps = jnp.where((path >= 0)[..., None], moves[jnp.maximum(path, 0)], 0)
         cells = jnp.moveaxis(start_ij[:, None] + jnp.cumsum(steps, axis=1), 1, 0)
         free = way_is_floor(cells, classes)
-        # counted, not summed: a sum of many reals depends on the order in which a batch of this size is added up
+        # counted, not summed: a sum of many reals depends on the order of addition in a batch of this size
         straight, diagonal = (jnp.sum((path >= 0) & (path % 2 == odd), axis=1) for odd in (0, 1))
         length = spec.pitch * (straight + diagonal * np.float32(np.sqrt(2)))
         whole = jnp.all(cells[-1] == goal_ij, axis=1)
@@ -84,6 +84,6 @@ def oracle_plan(arenas: Arena, settings: MissionParams, program: MissionSpec) ->
 
 
 def way_is_floor(cells_ij: Int[Array, "L A 2"], classes: Int[Array, "A H W"]) -> Bool[Array, "A"]:
-    """Whether every cell of each way is floor."""
+    """Whether every cell of each path is floor."""
     row = jnp.arange(classes.shape[0])
     return jnp.all(classes[row, cells_ij[..., 0], cells_ij[..., 1]] == Cell.FLOOR, axis=0)

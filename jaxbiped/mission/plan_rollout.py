@@ -1,4 +1,4 @@
-"""Following plans on a map that is known: what a route takes when it is walked, with nothing measured or missed."""
+"""Follow plans on a known map: the time of a route when it is walked without measurements or errors."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ def follow(
     program: MissionSpec,
     most: int = 100,
 ) -> Float[Array, "B"]:
-    """The time [s] in which each robot comes to stand in its goal's cell; inf where it does not.
+    """The time [s] at which each robot reaches its goal's cell; inf if it does not.
 
     Decision by decision as in a mission: plan, select, move nominally, count the durations and a measurement. The clock
-    is the mission's, at real yaws and places, so that it tells how good the clock of a plan over headings is.
+    is the mission's, with real yaws and positions, so it shows how accurate the clock of a plan over headings is.
 
     Args:
-      classes: true ones, with nothing unmeasured.
+      classes: the true ones, without unmeasured cells.
       settings: one kind of mission, leaves without a batch axis.
-      most: static; decisions, after which a robot has not arrived.
+      most: static; decisions after which a robot counts as not arrived.
     """
     spec = program.spec
 

@@ -1,4 +1,4 @@
-"""How far a mission's robot was from where it believed to be, and whether it saw landmarks: facts and a sentence."""
+"""The pose error of a mission's robot, and whether it saw landmarks: facts and a sentence."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def pose_errors(log: MissionLog) -> Float[np.ndarray, "T 2"]:
 
 
 def pose_facts(log: MissionLog) -> dict[str, Any]:
-    """The errors in metres and radians, at the end and the greatest, and how many measurements saw a landmark, as JSON.
+    """The errors in metres and radians, final and maximum, and how many measurements saw a landmark, as JSON.
 
-    `landmarks_seen` is None for a log that does not say it.
+    `landmarks_seen` is None for a log that does not record it.
     """
     errors = pose_errors(log)
-    measured = None if log.seen is None else log.seen[:-1]  # at the end nothing is measured
+    measured = None if log.seen is None else log.seen[:-1]  # nothing is measured at the end
     return {
         "pose_error_end": errors[-1].tolist(),
         "pose_error_greatest": errors.max(0).tolist(),
@@ -34,10 +34,10 @@ def pose_facts(log: MissionLog) -> dict[str, Any]:
 
 
 def pose_sentence(log: MissionLog) -> str:
-    """The same for people: how far the pose was off, and whether a landmark was seen."""
+    """The same as text: the pose error, and whether a landmark was seen."""
     facts = pose_facts(log)
     (off, turned), (furthest, _) = facts["pose_error_end"], facts["pose_error_greatest"]
-    said = f"pose {100 * off:.1f} cm and {math.degrees(turned):.1f}° from the truth at the end, "
+    said = f"pose error {100 * off:.1f} cm and {math.degrees(turned):.1f}° at the end, "
     said += f"{100 * furthest:.1f} cm at most"
     if not facts["landmarks"]:
         return f"{said}; the scene has no landmarks"

@@ -1,8 +1,8 @@
-"""From a decision to what the biped plays: requests in order, and the tables of servo targets that they stand for.
+"""From a decision to what the biped plays: requests in order, and their tables of servo targets.
 
-A mission's clock counts Table 2's durations, as with every executor. What is simulated may be faster: at the pace
+A mission's clock counts Table 2's durations, as with every executor. The simulation may be faster: at the pace
 `fast` a straight step takes 2.5 s instead of 16 s and one over an edge 8 s instead of 96 s, which servos and balance
-safely bear; at the pace `paper` the movements are Table 2's in time too.
+safely allow; at the pace `paper` the movements also have Table 2's durations.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ Pace = Literal["fast", "paper"]
 
 REST, PAIR = 0.5, 2.0  # [s] at the pace `fast`: of a movement, and of each pair of steps in it
 CLIMB, CROUCH = 8.0, 1.5  # [s] of a step up or down; of getting down or up
-PER_METRE = 1000  # displacements are rounded to a millimetre: what is left over is seen to by the next plan
-ANGLE = math.radians(0.5)  # [rad] lattice of turns
+PER_METRE = 1000  # displacements are rounded to a millimetre; the next plan corrects the remainder
+ANGLE = math.radians(0.5)  # [rad] resolution of turns
 WIDEST_TURN = math.pi / 2  # [rad] in one movement
 FURTHEST_CLIMB = 0.10  # [m] that a step up or down can reach
-TABLES = 4096  # kept
+TABLES = 4096  # tables kept in memory
 
 
 @dataclass(frozen=True)
@@ -47,15 +47,16 @@ class Move:
 
 
 def requests(move: Move, squatting: bool, rise: float, pace: Pace = "fast") -> tuple[Request, ...]:
-    """What a robot plays for a decision; empty where it only looks.
+    """The requests that a robot plays for a decision; empty if it only looks.
 
-    It gets up, if it squats and shall not; turns; gets down, if it shall squat; steps to the side; and plays the
-    primitive. Pass-gate is split: down once in front of the gate, straight steps in a squat, up when a decision is no
-    gate. Displacements are rounded to a millimetre and to `ANGLE`; a step up or down reaches at most `FURTHEST_CLIMB`.
+    It gets up, if it squats and must not; turns; gets down, if it must squat; steps sideways; and plays the
+    primitive. Pass-gate is split: down once in front of the gate, straight steps in a squat, up at the first decision
+    without a gate. Displacements are rounded to a millimetre and to `ANGLE`; a step up or down reaches at most
+    `FURTHEST_CLIMB`.
 
     Args:
       squatting: its stance before.
-      rise: [m] of one level.
+      rise: [m] height of one level.
     """
     parts = []
     if squatting and not move.squat:
@@ -87,5 +88,5 @@ def fast(request: Request) -> Request:
 
 @functools.lru_cache(maxsize=TABLES)
 def targets(request: Request, robot: RobotModelConfig) -> Float64[np.ndarray, "T 12"]:
-    """Servo targets [rad] of a request, one row a step; generated once for each."""
+    """Servo targets [rad] of a request, one row per step; each is generated once."""
     return generate(request, robot).ctrl

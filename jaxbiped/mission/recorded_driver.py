@@ -74,10 +74,10 @@ def run_logged(
     on_decision: Callable[[Played], None] = lambda _: None,
     eyes: Eyes | None = None,
 ) -> Mission:
-    """Run one mission (no batch axis) as the compiled driver would, and keep what it saw and thought.
+    """Run one mission (no batch axis) like the compiled driver, and keep what the robot saw and thought.
 
     Args:
-      eyes: what it sees with, where the program's sensor is no JAX.
+      eyes: its sensor, if the program's sensor is not in JAX.
     """
     recorder = Recorder(settings, program, on_decision, eyes)
     return recorder.mission(arena, run_bare(arena, settings, seed, program, eyes, recorder))
@@ -105,7 +105,7 @@ def run_bare(
 
 
 class Recorder:
-    """Keeps what one mission saw and thought; worlds, minds and so on have a leading axis of 1."""
+    """Records what one mission saw and thought; worlds, minds and so on have a leading axis of 1."""
 
     def __init__(
         self,
@@ -123,7 +123,7 @@ class Recorder:
         self.end: WorldState | None = None
 
     def decided(self, _: int, world: WorldState, command: Command, thought: DecisionTrace) -> None:
-        """One decision, before it is carried out."""
+        """Record one decision, before it is executed."""
         self.moments.append(moment(world, thought, self.settings, self.program, self.action))
         if shot := self.eyes and self.eyes.picture():
             self.pictures.append(Picture(shot.left, shot.disparity))
@@ -131,12 +131,12 @@ class Recorder:
         self.walked.append([])
 
     def moved(self, _: int, qpos: Float[np.ndarray, "nq"]) -> None:
-        """A simulated biped is in this state, on its way."""
+        """Record an intermediate state of a simulated biped."""
         if self.walked:
             self.walked[-1].append(qpos.astype(np.float32))
 
     def concluded(self, _: int, world: WorldState, mind: AgentState) -> None:
-        """What came of it."""
+        """Record the outcome."""
         command, world = jax.device_get((self.command, world))
         record = Played(
             name=NAMES[Primitive(int(command.primitive[0]))],
@@ -150,10 +150,10 @@ class Recorder:
         self.end, self.mind = world, mind
 
     def mission(self, arena: Arena, world: WorldState) -> Mission:
-        """The whole of it.
+        """The complete mission.
 
         Args:
-          world: as it began, for a mission that was over by then.
+          world: the initial world, for a mission that had already ended.
         """
         moments, world = list(self.moments), self.end or world
         if moments:

@@ -1,4 +1,4 @@
-"""The log of a mission as a file: what `jaxbiped view` shows, and what pages are drawn from without playing again.
+"""The log of a mission as a file: for `jaxbiped view`, and for pages drawn without playing again.
 
 A compressed `.npz`: arrays of fixed size by the names of `MissionLog`, ragged ones end to end with their lengths,
 pictures as JPEG, and a JSON header with everything else. Points are kept to 1 mm, disparities to 1/64 px.
@@ -22,9 +22,9 @@ from jaxbiped.files import write_whole
 from jaxbiped.mission.log import Ground, Mark, MissionLog, Outline, Picture, Walk
 
 FORMAT = 1
-FILE = "mission.npz"  # in a results folder
-MILLIMETRE, FAR = 1000.0, 32.0  # [1/m] in which points are written; [m] and how far they may lie
-FRACTION = 64.0  # [1/px] in which disparities are written
+FILE = "mission.npz"  # its name in a results folder
+MILLIMETRE, FAR = 1000.0, 32.0  # [1/m] resolution of points; [m] their maximum distance
+FRACTION = 64.0  # [1/px] resolution of disparities
 QUALITY = 88  # of JPEG
 WHOLE = ("classes", "levels", "true_xyyaw", "estimated_xyyaw", "time", "origin_xy", "size_xy", "goal_xy")
 OPTIONAL = ("true_z", "squat", "seen")
@@ -35,7 +35,7 @@ def save_log(path: str | Path, log: MissionLog, facts: Mapping[str, Any] | None 
     """Write a log as one file, whole or not at all.
 
     Args:
-      facts: what else is to be known of the mission, as JSON: its config, the scene's name, and so on.
+      facts: further facts about the mission, as JSON: its config, the scene's name, and so on.
 
     Raises:
       InputError: the file cannot be written.
@@ -68,10 +68,10 @@ def save_log(path: str | Path, log: MissionLog, facts: Mapping[str, Any] | None 
 
 
 def load_log(path: str | Path) -> tuple[MissionLog, dict[str, Any]]:
-    """A log that `save_log` wrote, and the facts that came with it.
+    """A log written by `save_log`, and the facts that came with it.
 
     Raises:
-      InputError: no such file, no log, a damaged one, or one of another format.
+      InputError: the file does not exist, is not a log, is damaged, or has another format.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -80,7 +80,7 @@ def load_log(path: str | Path) -> tuple[MissionLog, dict[str, Any]]:
     except FileNotFoundError:
         raise InputError("no such file", file=path) from None
     except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile):
-        raise InputError("is no log of a mission, or a damaged one", file=path) from None
+        raise InputError("is not the log of a mission, or is damaged", file=path) from None
     found = header.get("format") if isinstance(header, dict) else None
     if found != FORMAT:
         raise InputError(f"this version reads logs of format {FORMAT}", file=path, field="format", value=found)
@@ -125,24 +125,24 @@ def to_log(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> MissionLog:
 
 
 def ragged(name: str, each: Sequence[Num[np.ndarray, "..."]]) -> dict[str, np.ndarray]:
-    """Arrays of different lengths as two: all of them end to end, and their lengths."""
+    """Arrays of different lengths as two: their concatenation, and their lengths."""
     return {name: np.concatenate(each), f"{name}_lengths": np.array([len(one) for one in each])}
 
 
 def pieces(arrays: dict[str, np.ndarray], name: str) -> list[np.ndarray]:
-    """What `ragged` put together; none where there is no such name."""
+    """The arrays concatenated by `ragged`; none if the name does not exist."""
     if name not in arrays:
         return []
     return np.split(arrays[name], np.cumsum(arrays[f"{name}_lengths"])[:-1])
 
 
 def jpeg(image: UInt8[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "_"]:
-    """A picture as bytes."""
+    """A picture as JPEG bytes."""
     buffer = io.BytesIO()
     Image.fromarray(image).save(buffer, "JPEG", quality=QUALITY)
     return np.frombuffer(buffer.getvalue(), np.uint8)
 
 
 def pixels(data: UInt8[np.ndarray, "_"]) -> UInt8[np.ndarray, "h w 3"]:
-    """The picture of such bytes."""
+    """The picture in JPEG bytes."""
     return np.array(Image.open(io.BytesIO(data.tobytes())).convert("RGB"))

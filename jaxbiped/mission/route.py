@@ -1,4 +1,4 @@
-"""From the classed map to the problem that a planner is asked, and to the first moves of its answer."""
+"""From the classed map to the input of a planner, and to the first moves of its result."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def pose_problem(
     active: Bool[Array, "B"] | None = None,
     state=None,
 ) -> Problem:
-    """What the planner of each robot is asked.
+    """The planning problem of each robot.
 
-    Robots whose feet are placed keep off edges beside their way: `planning.edge_clearance` says what that costs.
+    Robots whose feet are placed keep away from edges beside their path: see `planning.edge_clearance` for the cost.
 
     Args:
       heading: the direction nearest to `yaw` [rad].
@@ -56,12 +56,12 @@ def pose_problem(
 
 
 def seconds_of_a_unit(settings: MissionParams) -> Float[Array, "*B"]:
-    """What a unit of Eq. 1 stands for [s], by a straight move on the floor: 8 s for the paper's costs and times."""
+    """Duration [s] of one unit of Eq. 1, from a straight move on the floor: 8 s for the paper's costs and times."""
     return settings.durations.straight / (settings.costs.c0 + settings.costs.c1)
 
 
 def times_of(settings: MissionParams) -> planning.Times:
-    """The durations of a mission's clock, and what C4 stands for in seconds."""
+    """The durations of a mission's clock, and C4 in seconds."""
     d = settings.durations
     return planning.Times(
         straight=d.straight,

@@ -20,19 +20,19 @@ from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 
 STRAIGHT, TURN, UP, DOWN, SQUAT, SIDE = range(len(PLAYED))
-WAY = (1 / 3, 2 / 3, 1.0)  # where on its way the body is checked against the boxes
+WAY = (1 / 3, 2 / 3, 1.0)  # fractions of its path at which the body is checked against boxes
 
 
 def sampled(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
     """Displacements, falls and stops as measured in simulation (`settings.library`); time is Table 2's.
 
-    Turn, step to the side and primitive are drawn one after the other. Each ends where it was asked to, but for the
-    mean error of the trials on the mild set and a normal one of their covariance, and falls as often as there. A step
-    over an edge stands as often as with the edge at that distance and yaw, which are those of the true arena on the
-    ways of the two feet. A rise ahead of a straight step stops the toes; whoever comes to stand nearer to an edge than
-    the trials on rims allow falls. Torso and head, swaying as measured, and the feet collide with true boxes and
-    terrain where those of the simulated biped would. Getting down and up displaces nothing: it was 0.1 mm. On terrain
-    the robot comes to stand at the height of the ground between its feet, where that is borne.
+    Turn, sideways step and primitive are drawn one after another. Each ends where requested, plus the mean error of the
+    trials on the mild set and a normal error with their covariance, and falls as often as there. A step over an edge
+    succeeds as often as in the trials with the edge at that distance and yaw, taken from the true arena on the paths of
+    the two feet. A rise ahead of a straight step stops the toes; a robot that ends nearer to an edge than the trials on
+    rims allow falls. Torso and head, swaying as measured, and the feet collide with true boxes and terrain where those
+    of the simulated biped would. Getting down and up displaces nothing: it was 0.1 mm. On terrain the robot ends at the
+    height of the ground between its feet, if that is within tolerance.
 
     Odometry counts the true displacement with the drift of every executor. Consumes the channels PLAY and ODOMETRY of
     the mission's seed.
@@ -98,10 +98,10 @@ def sampled(arena: Arena, world: WorldState, command: Command, settings: Mission
 def draw(
     library: Library, kind: Int[Array, ""], asked: Float[Array, "3"], seed: UInt32[Array, ""]
 ) -> tuple[Float[Array, "3"], Bool[Array, ""]]:
-    """Displacement (x, y) [m] and yaw [rad] of one primitive, and whether it falls. Nothing where nothing is asked for.
+    """Displacement (x, y) [m] and yaw [rad] of one primitive, and whether it falls. Zero if nothing is requested.
 
-    Mean and covariance of the error grow with the length or the angle, as of steps in a row; those of a step over an
-    edge do not: it was measured at the length that it is played at. What goes to the right is mirrored.
+    Mean and covariance of the error grow with the length or the angle, as for successive steps; those of a step over an
+    edge do not: it was measured at the length at which it is played. Movements to the right are mirrored.
     """
     request = library.request[kind]
     size = jnp.dot(asked, request) / jnp.dot(request, request)
@@ -117,10 +117,10 @@ def draw(
 def stand_probability(
     library: Library, kind: Int[Array, ""], length: Float[Array, ""], edge: Float[Array, "2"]
 ) -> Float[Array, ""]:
-    """How often a step of a length [m] stands whose edge is at these distances [m] from the two feet's middle.
+    """Success rate of a step of a length [m] whose edge is at these distances [m] from the middle of the two feet.
 
-    Bilinear between the trials; beyond them the nearest. A step that is longer or shorter than those tried wants its
-    edge half as much further or nearer.
+    Bilinear between the trials; beyond them the nearest one. For a step longer or shorter than those tried, the nominal
+    distance of the edge changes by half the difference.
     """
     which = jnp.where(kind == UP, 0, 1)
     yaw = jnp.arctan2(edge[1] - edge[0], 2 * library.feet[2])

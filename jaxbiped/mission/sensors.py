@@ -1,4 +1,4 @@
-"""Sensors that measure inside the compiled loop: those that are built in, and the base of those that people bring."""
+"""Sensors that measure inside the compiled loop: the built-in ones, and the base class of users' own."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from jaxbiped.sensing import oracle, raycast
 from jaxbiped.sensing.view import View
 
 ORACLE_SPACING = (
-    0.02  # [m] of the columns of the oracle's points, or a cell's pitch if that is less; thinner walls slip through
+    0.02  # [m] spacing of the oracle's columns of points, or the cells' pitch if smaller; thinner walls are missed
 )
-ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid by itself
+ORACLE_WEIGHT = 256.0  # [px] of each of its points: enough to count as solid alone
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Standpoint:
-    """From where, and how, one robot measures."""
+    """The viewpoint of one robot, and how it measures."""
 
     pose: Pose  # the true one; z is the height of the ground under the robot
     looks_down: Bool[Array, "*B"]  # its camera is tilted to the feet
@@ -36,18 +36,18 @@ class Standpoint:
 
 
 class Sensor:
-    """The base of sensors: a frozen dataclass that is a pytree, as planners are. It is written for one robot."""
+    """Base class of sensors: a frozen dataclass that is a pytree, like planners. It is written for one robot."""
 
-    knows_pose: ClassVar[bool] = False  # the robot knows where it stands, and its points are level
-    on_terrain: ClassVar[bool] = False  # it knows arenas with terrain
-    is_picture: ClassVar[bool] = False  # its points are those of the camera's rays, row by row
+    knows_pose: ClassVar[bool] = False  # whether the robot knows its pose, and its points are level
+    on_terrain: ClassVar[bool] = False  # whether it supports arenas with terrain
+    is_picture: ClassVar[bool] = False  # whether its points are those of the camera's rays, row by row
 
     def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
         """Points in the robot frame of one `Arena`.
 
         Args:
           settings: `settings.camera`, `settings.stereo` and so on, traced.
-          program: what is static: `program.image` (the camera's rays), `program.spec` (the grid).
+          program: static values: `program.image` (the camera's rays), `program.spec` (the grid).
 
         Numbers that are not finite end the mission as `invalid`.
         """
@@ -72,7 +72,7 @@ class RayCast(Sensor):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Oracle(Sensor):
-    """The true arena, all of it, and the true pose; see `sensing.oracle`."""
+    """The complete true arena, and the true pose; see `sensing.oracle`."""
 
     knows_pose, on_terrain = True, True
 
@@ -89,10 +89,10 @@ for _name, _sensor in BUILT_IN.items():
 
 
 def find_sensor(name: str) -> Sensor | None:
-    """The sensor of a name in the registry, or of `package.module:name`, which is imported; None: on the host.
+    """The sensor registered under a name, or imported from `package.module:name`; None: on the host.
 
     Raises:
-      InputError: a name that is not known, with those that are; a module that cannot be imported.
+      InputError: an unknown name, with the known ones; a module that cannot be imported.
     """
     return (
         None
@@ -102,10 +102,10 @@ def find_sensor(name: str) -> Sensor | None:
 
 
 def view_of(sensor: Sensor, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
-    """What a sensor measures, checked where it is not built in; what is not finite is all in the weights then, as NaN.
+    """A sensor's measurement, checked if it is not built in; values that are not finite make all weights NaN.
 
     Raises:
-      InputError: something that is not the view of one robot.
+      InputError: a result that is not the view of one robot.
     """
     view = sensor.measure(arena, at, settings, program)
     if type(sensor) in (RayCast, Oracle):
@@ -116,7 +116,7 @@ def view_of(sensor: Sensor, arena: Any, at: Standpoint, settings: Any, program: 
     shapes = [jnp.shape(leaf) for leaf in jax.tree.leaves(view)]
     if len(set(shapes)) != 1 or len(shapes[0]) != 1 or shapes[0][0] == 0:
         said = ", ".join(str(list(shape)) for shape in shapes)
-        raise InputError(f"gave x, y, z and weight of the shapes {said} where [N] is wanted for all", field=where)
+        raise InputError(f"gave x, y, z and weight of the shapes {said} where [N] is required for all", field=where)
     view = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), view)
     fine = jnp.isfinite(view.x + view.y + view.z + view.weight) & (view.weight >= 0)
     clean = jax.tree.map(lambda leaf: jnp.where(fine, leaf, 0.0), view)

@@ -1,4 +1,4 @@
-"""Everything a mission depends on besides its arena: the config for people, and its traced form."""
+"""Everything that a mission depends on besides its arena: the traced form of the config."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from jaxbiped.sensing.odometry import OdometryNoise
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Limits:
-    """`LimitConfig`, traced, and the radius of the body that collides."""
+    """`LimitConfig`, traced, and the radius of the colliding body."""
 
     goal_radius: Float[Array, "*B"]  # [m]
     max_decisions: Int[Array, "*B"]
@@ -52,7 +52,7 @@ class Limits:
     edge_tolerance: Float[Array, "*B"]  # [m]
     height_tolerance: Float[Array, "*B"]  # [m]
     body_radius: Float[Array, "*B"]  # [m]
-    rise: Float[Array, "*B"]  # [m] that a step up or down goes: one level
+    rise: Float[Array, "*B"]  # [m] height of a step up or down: one level
     start_variance: Float[Array, "*B 3"]  # [m2, m2, rad2]
 
 
@@ -75,30 +75,30 @@ class MissionParams:
     library: Library
     footing: Footing
     limits: Limits
-    metrics: tuple[Metric, ...] = ()  # that rows shall have beside what every mission has
+    metrics: tuple[Metric, ...] = ()  # additional columns of rows
     sensor: Any = None  # `Sensor`; None: on the host
     executor: Any = None  # `Executor`; None: a simulated biped
 
 
 @dataclass(frozen=True)
 class MissionSpec:
-    """What sets array shapes and code paths: a mission program is compiled once for each of these. Hashable."""
+    """What determines array shapes and code paths: one mission program is compiled for each of these. Hashable."""
 
     spec: GridSpec
     image: ImageSpec
     sensor: str
     executor: str
-    footing: bool = False  # feet are placed by measured edges; else by cells alone
+    footing: bool = False  # whether feet are placed by measured edges; else by cells only
     localisation: str = "landmarks"
-    fading: bool = False  # the map forgets what has moved
-    knows_pose: bool = False  # the robot does, and its points have no attitude error to take out
+    fading: bool = False  # whether the map forgets what has moved
+    knows_pose: bool = False  # whether the robot does, and its points have no attitude error to remove
 
 
 def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> MissionSpec:
-    """The static part of a config for arenas of one size [m], and with such terrain, whose heights are concrete.
+    """The static part of a config for arenas of one size [m] with such terrain, whose heights are concrete.
 
     Raises:
-      InputError: a pitch that does not divide the size, or walls to be matched by a sensor without pictures.
+      InputError: a pitch that does not divide the size, or wall matching with a sensor without pictures.
     """
     heights = (0.0, 0.0) if terrain is None else height_range(terrain)
     sensor, executor = find_sensor(config.sensor), find_executor(config.executor)
@@ -121,11 +121,11 @@ def program(config: MissionConfig, size_xy: tuple[float, float], terrain: Height
     )
 
 
-PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # of strategies that bring none of their own
+PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # for strategies without their own
 
 
 def settings_of(config: MissionConfig, strategy: str | Strategy) -> MissionParams:
-    """The traced form of a config, for one strategy or the one of a name."""
+    """The traced form of a config, for one strategy, given as object or by name."""
     limits = config.limits
     sd, sd_yaw = limits.start_sd
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
@@ -160,11 +160,11 @@ def settings_of(config: MissionConfig, strategy: str | Strategy) -> MissionParam
 
 @functools.lru_cache(maxsize=256)
 def numbers(config: Model, form: str = "traced"):
-    """The traced form of a part of a config, made once for all the points of a sweep that share the part."""
+    """The traced form of a part of a config, made once for all points of a sweep that share the part."""
     return getattr(config, form)()
 
 
 @functools.lru_cache(maxsize=8)
 def library_numbers(path: Path | None) -> Library:
-    """The same of a library file."""
+    """The same for a library file."""
     return load_library(path).traced()

@@ -1,9 +1,9 @@
-"""The driver of simulated bipeds: a batch of them walks, each in its own arena, and those that are done decide.
+"""The driver of simulated bipeds: a batch walks, each robot in its own arena, and those that are done decide.
 
-Each slot has a tape of servo targets and its own place on it. The batch is stepped in short slices; after each, the
-slots whose tape has ended (or that fell, or hit something) sense from where their cameras really are, and decide
-together. None waits for another. A slot whose mission has ended takes the next job. In `native` physics a mission
-depends, bit for bit, neither on the number of slots, nor on its neighbours or its place in the queue.
+Each slot has a tape of servo targets and its own position on it. The batch is stepped in short slices; after each,
+the slots whose tape has ended (or that fell, or hit something) sense from the true positions of their cameras, and
+decide together. None waits for another. A slot whose mission has ended takes the next job. In `native` physics a
+mission depends, bit for bit, neither on the number of slots, nor on its neighbours or its place in the queue.
 """
 
 from __future__ import annotations
@@ -50,16 +50,16 @@ from jaxbiped.mission.state import AgentState, BodyPose, WorldState, start
 from jaxbiped.motion.grid_units import CELL
 from jaxbiped.motion.primitives import Command, Primitive
 
-SLICE = 32  # steps (0.16 s) between two looks at who is done
-SETTLE = 0.3  # [s] that a robot stands before it measures
+SLICE = 32  # steps (0.16 s) between two checks of which robots are done
+SETTLE = 0.3  # [s] standing time before a measurement
 LEVEL = GridSpec().level_height  # [m]
-HEADROOM = 1e-4  # [m] that the simulated head may be higher than the map's, by rounding
+HEADROOM = 1e-4  # [m] by which the simulated head may exceed the map's, due to rounding
 ROWS = 8  # robots that decide in one call: the same program, whatever the number of slots
 
 
 @runtime_checkable
 class Observer(Protocol):
-    """Is told of missions as they go; all pytrees have a leading axis of 1."""
+    """Informed of missions as they proceed; all pytrees have a leading axis of 1."""
 
     def decided(self, job: int, world: WorldState, command: Command, thought: DecisionTrace, /) -> None: ...
 
@@ -79,18 +79,18 @@ def walk(
     observer: Observer | None = None,
     eyes: Eyes | None = None,
 ) -> Result:
-    """Work a queue of missions off; `program.executor` names the physics.
+    """Process a queue of missions; `program.executor` names the physics.
 
     Args:
       arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
       on_progress: called with the tally of the jobs.
-      eyes: what robots see with, where the program's sensor is no JAX.
+      eyes: the robots' sensor, if the program's sensor is not in JAX.
 
     Returns:
       Results in the order of the jobs, on the host; padding stays RUNNING.
 
     Raises:
-      InputError: a device that is not there, a biped that cannot play its primitives, or arenas with terrain.
+      InputError: a missing device, a biped that cannot play its primitives, or arenas with terrain.
     """
     refuse_terrain(arenas, f"executor {program.executor}")
     return Walkers(arenas, settings, jobs, program, config, observer, eyes).work(on_progress)
@@ -106,7 +106,7 @@ def walk_logged(
     on_decision: Callable[[Played], None] = lambda _: None,
     eyes: Eyes | None = None,
 ) -> Mission:
-    """One mission of a simulated biped, with a log of everything; as `recorded_driver.run_logged` gives it."""
+    """One mission of a simulated biped, with a log of everything, like `recorded_driver.run_logged`."""
     arenas, points, world = jax.tree.map(
         lambda leaf: jnp.asarray(leaf)[None],
         (arena, settings, start(arena, settings, seed, program.spec, program.localisation)[0]),
@@ -119,11 +119,11 @@ def walk_logged(
 
 
 def rehearse(config: MissionConfig) -> None:
-    """Refuse what cannot be simulated, before anything is written, printed or compiled at length.
+    """Reject what cannot be simulated, before anything is written, printed or compiled at length.
 
     Raises:
-      InputError: a device or a package that is not there, a biped that cannot play its primitives, or one that is
-        higher than the robot that the map is made for.
+      InputError: a missing device or package, a biped that cannot play its primitives, or one that is taller than the
+        robot that the map is made for.
     """
     if config.executor not in SIMULATED:
         return
@@ -142,7 +142,7 @@ def rehearse(config: MissionConfig) -> None:
 
 
 class Walkers:
-    """The slots, and the queue that they work off."""
+    """The slots, and the queue that they process."""
 
     def __init__(self, arenas, settings, jobs, program: MissionSpec, config: WalkConfig, observer=None, eyes=None):
         self.arenas, self.settings, self.jobs = arenas, settings, jobs
@@ -156,7 +156,7 @@ class Walkers:
         self.job, self.next_job = np.arange(size), size
         self.squat = np.zeros(size, bool)
         self.tapes = [self.stage.rest(False)] * size
-        self.place, self.length = np.zeros((2, size), int)  # on the tape; beyond its end the last row is held
+        self.place, self.length = np.zeros((2, size), int)  # position on the tape; beyond its end the last row is held
         jobs_in_all = len(self.arena_of)
         self.goals = np.asarray(arenas.goal_xy)
         self.world, self.mind = fresh(arenas, settings, jobs, jnp.asarray(self.job), program)
@@ -166,7 +166,7 @@ class Walkers:
         self.enter(np.ones(size, bool))
 
     def work(self, on_progress: OnProgress) -> Result:
-        """Until the queue is empty."""
+        """Run until the queue is empty."""
         while np.any(self.job < self.count):
             stopped = self.stage.fell | self.stage.collided | ~self.stage.state.valid
             ready = np.flatnonzero((self.job < self.count) & (stopped | (self.place >= self.length)))
@@ -179,7 +179,7 @@ class Walkers:
         return self.result
 
     def play(self) -> None:
-        """Step all robots that have a job by a slice."""
+        """Step all robots that have a job by one slice."""
         ahead = [
             tape[np.minimum(np.arange(place, place + SLICE), len(tape) - 1)]
             for tape, place in zip(self.tapes, self.place, strict=True)
@@ -191,7 +191,7 @@ class Walkers:
                 self.observer.moved(int(self.job[s]), np.asarray(self.stage.state.qpos[s]))
 
     def turn(self, ids: Int[np.ndarray, "n"]) -> None:
-        """What some robots did is judged; those whose missions go on sense and decide, others take the next jobs."""
+        """Judge some robots' actions; those whose missions continue sense and decide, others take the next jobs."""
         stands = self.stage.stands(ids, self.squat[ids])
         rows = np.resize(ids, ROWS)
         feet, body = (jnp.asarray(np.resize(v, (ROWS, v.shape[1])).T, jnp.float32) for v in (stands.feet, stands.body))
@@ -226,7 +226,7 @@ class Walkers:
             self.renew(ended)
 
     def take(self, s: int | np.integer, command: Command, verdict: int, feet: Float[np.ndarray, "4"]) -> None:
-        """A robot's next tape."""
+        """Set up a robot's next tape."""
         point = self.point_of[self.job[s]]
         step, rise = self.step[point], self.rise[point]
         move = Move(
@@ -242,14 +242,14 @@ class Walkers:
         self.stage.expect(s, feet, float(max(move.rise, 0) * rise + step))
 
     def lay(self, s: int | np.integer, tables: Sequence[Float[np.ndarray, "_ 12"]], squat: bool) -> None:
-        """Put a robot at the beginning of a tape, which ends after a while of standing; an empty one ends at once."""
+        """Put a robot at the start of a tape, which ends after some standing time; an empty one ends at once."""
         self.squat[s] = squat
         self.tapes[s] = np.concatenate([*tables, self.stage.rest(squat)])
         self.place[s] = 0
         self.length[s] = len(self.tapes[s]) + round(SETTLE / TIMESTEP) if tables else 0
 
     def write(self, s: int | np.integer, world: WorldState) -> None:
-        """Write down how the mission of a slot ended."""
+        """Record how the mission of a slot ended."""
         job = self.job[s]
         worked = np.float32(self.stage.work[s])
         metrics = zip(self.settings.metrics, world.metrics, strict=True)
@@ -259,7 +259,7 @@ class Walkers:
             column[job] = value
 
     def renew(self, ended: Bool[np.ndarray, "S"]) -> None:
-        """Give the slots of a mask the next jobs, or none when there are no more."""
+        """Give the slots of a mask the next jobs, or none if there are no more."""
         self.job[ended] = self.next_job + np.arange(ended.sum())
         self.next_job += int(ended.sum())
         begun = fresh(self.arenas, self.settings, self.jobs, jnp.asarray(self.job), self.program)
@@ -268,7 +268,7 @@ class Walkers:
         self.enter(ended)
 
     def enter(self, mask: Bool[np.ndarray, "S"]) -> None:
-        """Stand the robots of a mask at the starts of their arenas."""
+        """Place the robots of a mask at the starts of their arenas."""
         pose = jax.device_get(self.world.pose)
         arena = self.arena_of[np.minimum(self.job, len(self.arena_of) - 1)]
         self.stage.enter(mask, arena, np.stack([pose.x, pose.y, pose.z, pose.yaw], axis=1).astype(float))
@@ -278,7 +278,7 @@ class Walkers:
     def tell(
         self, ids, plan: Plan, world: WorldState, moved: AgentState, following: Plan, thought: DecisionTrace
     ) -> None:
-        """Tell the observer."""
+        """Inform the observer."""
         for k, s in enumerate(ids):
             job = int(self.job[s])
             at = slice(k, k + 1)

@@ -1,4 +1,4 @@
-"""What simulated bipeds and their referee compute between two movements: judge the one, plan the next. All in JAX."""
+"""What simulated bipeds and their referee compute between two movements: judge the last, plan the next. All in JAX."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 from jaxbiped.sensing.view import Sightings, View
 
-HINDERED, TWISTED = 0.02, 0.1  # [m, rad] off where a command leads: something was in the way
-PATIENCE = 2  # commands in a row that were hindered before the robot believes its feet
-TOUCH_VOTES = 1e5  # [px] what feet felt outvotes all that was seen
-BACK = 0.04  # [m] of a step backward
+HINDERED, TWISTED = 0.02, 0.1  # [m, rad] deviation from a command's target that indicates an obstruction
+PATIENCE = 2  # successive hindered commands before the robot believes its feet
+TOUCH_VOTES = 1e5  # [px] contact felt by the feet outvotes everything seen
+BACK = 0.04  # [m] length of a step backward
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Plan:
-    """What a robot is at."""
+    """The current action of a robot."""
 
     command: Command
     verdict: Int[Array, "*B"]
     some: Bool[Array, "*B"]  # False before the first decision
-    hindered: Int[Array, "*B"]  # commands before this one, in a row, that something was in the way of
+    hindered: Int[Array, "*B"]  # number of successive hindered commands before this one
 
 
 def no_plan(size: int) -> Plan:
-    """Before the first decision."""
+    """The plan before the first decision."""
     zero, whole, no = jnp.zeros(size), jnp.zeros(size, jnp.int32), jnp.zeros(size, bool)
     return Plan(Command(turn=zero, primitive=whole, length=zero, rise=whole, squat=no, left=zero), whole, no, whole)
 
@@ -56,7 +56,7 @@ def gather(tree, rows: Int[Array, "n"]):
 
 @jax.jit
 def scatter(tree, rows: Int[Array, "n"], values):
-    """Every leaf with some of its rows replaced; rows beyond its length are dropped."""
+    """Replace some rows of every leaf; rows beyond its length are dropped."""
     return jax.tree.map(lambda leaf, new: leaf.at[rows].set(new, mode="drop"), tree, values)
 
 
@@ -87,10 +87,10 @@ def judge_and_think(
     settings: MissionParams,
     program: MissionSpec,
 ) -> tuple[WorldState, AgentState, AgentState, Plan, DecisionTrace]:
-    """The referee looks at what came of each robot's plan, and each robot makes its next one.
+    """The referee judges each robot's last plan, and each robot makes its next one.
 
     Returns:
-      The world and the mind after what was done; the mind after the next measurement; the next plan; the thought.
+      The world and the mind after the action; the mind after the next measurement; the next plan; the trace.
     """
     world, mind, times = judge(world, mind, plan, after, fell, collided, arena, settings, program)
     return world, mind, *think_on(world, mind, times, carriage, arena, settings, program)
@@ -108,13 +108,13 @@ def judge(
     settings: MissionParams,
     program: MissionSpec,
 ) -> tuple[WorldState, AgentState, Int[Array, "n"]]:
-    """The referee looks at what came of each robot's plan.
+    """The referee judges the outcome of each robot's plan.
 
-    Deviation: the paper's robot knows nothing but what it sees. Here, feet that were stopped `PATIENCE` times in a row,
-    by an edge that the map has elsewhere, make the robot step back and plan round that cell.
+    Deviation: the paper's robot knows only what it sees. Here, feet that were stopped `PATIENCE` times in a row, by an
+    edge that the map has elsewhere, make the robot step back and plan around that cell.
 
     Returns:
-      The world and the mind after what was done; how many commands in a row something was in the way of.
+      The world and the mind after the action; how many successive commands were hindered.
     """
     executed = jax.vmap(carried_out)(world, plan.command, after, fell, collided, arena, settings)
     done = jax.vmap(apply_outcome, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
@@ -137,10 +137,10 @@ def think_on(
     program: MissionSpec,
     seen: tuple[View, Sightings] | None = None,
 ) -> tuple[AgentState, Plan, DecisionTrace]:
-    """Each robot measures, or has `seen`, and makes its next plan; `times` is what `judge` returned.
+    """Each robot measures, or has `seen`, and makes its next plan; `times` is the count returned by `judge`.
 
     Returns:
-      The mind after the measurement; the plan; the thought.
+      The mind after the measurement; the plan; the trace.
     """
     _, thinking, command, verdict, thought = sense_and_decide(world, mind, arena, settings, program, carriage, seen)
     stuck = times >= PATIENCE
@@ -149,9 +149,9 @@ def think_on(
 
 
 def hindered(command: Command, moved: Float[Array, "n 3"]) -> Bool[Array, "n"]:
-    """Whether feet were in the way of something low: by odometry [n, 3], the robot is not where its command leads.
+    """Whether feet hit something low: by odometry [n, 3], the robot is not where its command leads.
 
-    Steps over an edge do not count, and neither does what was hindered while it backed off.
+    Steps over an edge do not count, nor do commands hindered while backing off.
     """
     cos, sin = jnp.cos(command.turn), jnp.sin(command.turn)
     x, y = command.length * cos - command.left * sin, command.length * sin + command.left * cos
@@ -161,9 +161,9 @@ def hindered(command: Command, moved: Float[Array, "n 3"]) -> Bool[Array, "n"]:
 
 
 def feel(mind: AgentState, before: Pose, command: Command, spec: GridSpec) -> AgentState:
-    """Write an obstacle into the map of one robot, at the cell where feet that were hindered should have come to stand.
+    """Write an obstacle into the map of one robot, at the cell where hindered feet should have ended.
 
-    If it stands in that cell, then at the cell behind it.
+    If it stands in that cell, the cell behind it is used.
     """
     yaw = before.yaw + command.turn
     ahead = Pose(before.x, before.y, before.z, yaw)
@@ -176,7 +176,7 @@ def feel(mind: AgentState, before: Pose, command: Command, spec: GridSpec) -> Ag
 
 
 def back_off(command: Command) -> Command:
-    """A step backward instead of what was decided."""
+    """A step backward instead of the decided command."""
     zero, whole = jnp.zeros_like(command.length), jnp.zeros_like(command.primitive)
     return Command(
         turn=zero,
@@ -197,9 +197,9 @@ def carried_out(
     arena: Arena,
     settings: MissionParams,
 ) -> Execution:
-    """What came of a command, from where the engine says that the robot stands after it.
+    """The outcome of a command, from the robot's pose afterwards according to the engine.
 
-    Odometry counts the true displacement, with the noise of every executor: so much as joints and feet tell of it.
+    Odometry counts the true displacement with the noise of every executor, since joints and feet can measure that.
     Time is Table 2's, distance the true one. Consumes channel ODOMETRY of the mission's seed.
     """
     dx, dy = to_robot(world.pose, after.x, after.y)

@@ -1,4 +1,4 @@
-"""What a log keeps of one decision, and of the arena that it was made in."""
+"""The record of one decision in a log, and of the arena in which it was made."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from jaxbiped.mission.state import WorldState
 def moment(
     world: WorldState, thought: DecisionTrace, settings: MissionParams, program: MissionSpec, action: str
 ) -> dict:
-    """What a log keeps of one decision."""
+    """The record of one decision in a log."""
     points, counts, voxels = jax.device_get(as_mapped(thought, settings, program))
     plan = planned_way(thought, settings, program)
     world, pose, seen, measuring = jax.device_get((world, thought.pose, thought.landmarks, settings.durations.measure))
@@ -46,7 +46,7 @@ def moment(
 def as_mapped(
     thought: DecisionTrace, settings: MissionParams, program: MissionSpec
 ) -> tuple[Float[Array, "N 3"], Bool[Array, "N"], Bool[Array, "H W Z"]]:
-    """The points of a view as the map takes them [m, world as believed], which of them count, and occupied voxels."""
+    """The points of a view as used by the map [m, believed world], which of them count, and occupied voxels."""
     spec, mapping = program.spec, settings.mapping
     view, evidence, pose = jax.tree.map(lambda leaf: leaf[0], (thought.view, thought.evidence, thought.pose))
     if not program.knows_pose:
@@ -58,7 +58,7 @@ def as_mapped(
 
 
 def walk_of(walked: list[list[np.ndarray]]) -> Walk | None:
-    """States after each decision, each lot spread evenly over the time from its moment to the next."""
+    """States after each decision, each group spread evenly over the time from its moment to the next."""
     states = [state for lot in walked for state in lot]
     if not states:
         return None
@@ -67,7 +67,7 @@ def walk_of(walked: list[list[np.ndarray]]) -> Walk | None:
 
 
 def nothing(world: WorldState, program: MissionSpec) -> dict:
-    """The one moment of a mission that ended before it began."""
+    """The only moment of a mission that ended before it began."""
     blank = np.zeros(program.spec.shape, np.int8)
     here = pose_of(world)
     return {
@@ -98,7 +98,7 @@ def mind_pose(mind) -> Float[np.ndarray, "3"]:
 
 
 def planned_way(thought: DecisionTrace, settings: MissionParams, program: MissionSpec) -> Float[np.ndarray, "n 2"]:
-    """Cell centres [m] of the planned path, from the robot's cell on; empty where there is none."""
+    """Cell centres [m] of the planned path, starting at the robot's cell; empty if there is none."""
     spec = program.spec
     moves = np.asarray(way(thought, settings))[0]
     moves = moves[: np.argmax(moves < 0)] if np.any(moves < 0) else moves
@@ -138,7 +138,7 @@ def ground(arena: Arena) -> Ground | None:
 
 
 def way_of(arena: Arena, m: int | np.integer) -> tuple[float, float, float, float] | None:
-    """How one box moves; None where all of the arena stand."""
+    """The motion of one box; None if all boxes of the arena stand still."""
     movers = arena.movers
     return movers and tuple(float(value[m]) for value in (movers.dx, movers.dy, movers.speed, movers.phase))
 

@@ -1,4 +1,4 @@
-"""Simulated robots in their arenas: a batch of them, each with its boxes, and what the engine says is true of it."""
+"""Simulated robots in their arenas: a batch of robots with their boxes, and the true state according to the engine."""
 
 from __future__ import annotations
 
@@ -16,45 +16,45 @@ from jaxbiped.biped.gait import home_table
 from jaxbiped.biped.model import FAR, add_terrain, home_qpos, part_geoms, robot_spec
 from jaxbiped.geometry.boxes import Boxes
 
-FIELDS = ("geom_pos", "geom_size", "geom_quat")  # that an arena's boxes are written into
+FIELDS = ("geom_pos", "geom_size", "geom_quat")  # fields that hold an arena's boxes
 BODY = "body"  # watch of torso and head; those of the feet are named by box
-HAIR = 1e-4  # [m] that torso or head may press into a box
-BURIED = 0.1  # [m] that boxes reach below the floor: thin plates would let feet through sideways
-TOPPLED = math.cos(math.radians(45.0))  # of the torso's tilt
-LOWEST = 0.5  # of the squatting height of the hips: lower is fallen
-KICK = 0.01  # [m] above what it may step on that a foot may touch
-EMPTY, NEVER = -1, -2  # of a slot: no box is in it; nothing is written yet
-MJX_BOXES = 4  # most box slots in MJX, which pays for each contact that there might be
+HAIR = 1e-4  # [m] allowed penetration of a box by torso or head
+BURIED = 0.1  # [m] depth of boxes below the floor: feet would slip through thin plates sideways
+TOPPLED = math.cos(math.radians(45.0))  # cosine of the torso's tilt
+LOWEST = 0.5  # fraction of the hips' squatting height below which a robot has fallen
+KICK = 0.01  # [m] height above the allowed step that a foot may touch
+EMPTY, NEVER = -1, -2  # of a slot: it has no box; nothing is written yet
+MJX_BOXES = 4  # most box slots in MJX, where each possible contact costs time
 
 
 @dataclass(frozen=True)
 class Stands:
-    """Where robots stand, and how they hold their bodies. NaN where a simulation is not valid."""
+    """Poses of robots and of their bodies. NaN if a simulation is not valid."""
 
-    feet: Float[np.ndarray, "n 4"]  # (x, y, z, yaw) [m, rad] of the middle between the soles
-    body: Float[np.ndarray, "n 6"]  # (x, y, z, yaw, roll, pitch) of the robot frame that the cameras are fixed to
+    feet: Float[np.ndarray, "n 4"]  # (x, y, z, yaw) [m, rad] of the midpoint of the soles
+    body: Float[np.ndarray, "n 6"]  # (x, y, z, yaw, roll, pitch) of the robot frame to which the cameras are fixed
 
 
 class Stage:
-    """A batch of robots that walk in arenas of their own.
+    """A batch of robots that walk in their own arenas.
 
-    What ends a mission is noted while they move: `fell` and `collided` [S] stay on until a robot is placed anew. It has
-    fallen when its torso tilts by over 45 degrees or its hips are down. It has collided when torso or head press into a
-    box, or a foot touches one that is too high above its ground to be stepped on. Legs have no geoms: what they brush
-    is not seen.
+    Events that end a mission are recorded while they move: `fell` and `collided` [S] stay set until a robot is placed
+    again. It has fallen if its torso tilts by over 45 degrees or its hips are down. It has collided if torso or head
+    press into a box, or a foot touches one that is too high above its ground to step on. Legs have no geoms: their
+    contacts are not detected.
     """
 
     def __init__(self, name: str, size: int, boxes: Boxes, robot: RobotModelConfig, **options: Any):
         """
         Args:
           name: `native` or `mjx`; other options are those of `physics.make`.
-          size: robots, S.
-          boxes: of all arenas [A, M], on the host. A robot in MJX meets at most `MJX_BOXES` of them, the nearest.
+          size: number of robots, S.
+          boxes: boxes of all arenas [A, M], on the host. A robot in MJX meets at most the `MJX_BOXES` nearest of them.
         """
         most = boxes.x.shape[1]
         self.slots = min(most, MJX_BOXES) if name == "mjx" else most
         self.robot, self.boxes = robot, boxes
-        self.arena = np.zeros(size, int)  # that each robot is in
+        self.arena = np.zeros(size, int)  # arena of each robot
         self.home = [home_table(robot, squatting) for squatting in (False, True)]
         spec = add_terrain(robot_spec(robot), self.slots)
         named = [f"box_{k}" for k in range(self.slots)]
@@ -73,9 +73,9 @@ class Stage:
         self.tops = np.full((size, self.slots), -np.inf)  # [m]
         self.ground, self.reach = np.zeros(
             (2, size)
-        )  # [m] where each stood, and the highest top that its feet may touch
+        )  # [m] ground where each stood, and the highest top that its feet may touch
         self.fell, self.collided, self.changed = np.zeros((3, size), bool)
-        self.work = np.zeros(size)  # [J] of all servos since each was placed, where the backend sums it up
+        self.work = np.zeros(size)  # [J] of all servos since each was placed, if the backend accumulates it
         self.state = None
 
     def rest(self, squat: bool) -> Float64[np.ndarray, "1 12"]:
@@ -85,7 +85,7 @@ class Stage:
     def enter(
         self, mask: Bool[np.ndarray, "S"], arena: Int[np.ndarray, "S"], xyz_yaw: Float64[np.ndarray, "S 4"]
     ) -> None:
-        """Stand the robots of a mask in arenas, upright and at rest: middle between the feet [m] and yaw [rad]."""
+        """Place the robots of a mask in arenas, upright and at rest: midpoint of the feet [m] and yaw [rad]."""
         self.arena[mask], self.held[mask] = arena[mask], NEVER
         qpos = np.tile(self.model.qpos0, (len(mask), 1))
         pelvis, q = self.home[0].pelvis[-1], self.home[0].q[-1]
@@ -100,9 +100,9 @@ class Stage:
         self.work[mask] = 0.0
 
     def expect(self, s: int | np.integer, feet: Float64[np.ndarray, "4"], climb: float) -> None:
-        """What a robot does next begins at (x, y, z, yaw), and may climb so high [m].
+        """Announce a robot's next action, which begins at (x, y, z, yaw) and may climb this high [m].
 
-        The nearest boxes take the slots. One that had a slot keeps it, so that contacts with it go on as they are.
+        The nearest boxes take the slots. One that had a slot keeps it, so that its contacts continue unchanged.
         """
         self.ground[s], self.reach[s] = feet[2], feet[2] + climb + KICK
         near = nearest(self.boxes, self.arena[s], feet[:2], self.slots)
@@ -113,7 +113,7 @@ class Stage:
                 self.place(s, k)
 
     def place(self, s: int | np.integer, k: int) -> None:
-        """Write the box that a slot holds into its geom, or send the geom far below."""
+        """Write the box of a slot into its geom, or move the geom far below."""
         position, size, quaternion = (self.fields[field][s, self.ids[k]] for field in FIELDS)
         boxes, a, m = self.boxes, self.arena[s], self.held[s, k]
         self.changed[s] = True
@@ -129,7 +129,7 @@ class Stage:
         self.tops[s, k] = top
 
     def play(self, controls: Float64[np.ndarray, "S T 12"], mask: Bool[np.ndarray, "S"] | None = None) -> None:
-        """Step the robots of a mask (all where None), and note who falls or collides."""
+        """Step the robots of a mask (all if None), and record which fall or collide."""
         if self.changed.any():
             self.backend.set_fields(self.fields, self.changed)
             self.changed[:] = False
@@ -143,10 +143,10 @@ class Stage:
         self.fell |= state.valid & ((upright < TOPPLED) | low) & ~self.collided
 
     def stands(self, ids: Int[np.ndarray, "n"], squat: Bool[np.ndarray, "n"]) -> Stands:
-        """Where some robots stand now.
+        """The current poses of some robots.
 
         Args:
-          squat: their stances, whose home posture the body's frame is measured against.
+          squat: their stances, whose home posture is the reference of the body frame.
         """
         feet, body = np.full((len(ids), 4), np.nan), np.full((len(ids), 6), np.nan)
         for n, s in enumerate(ids):
@@ -164,7 +164,7 @@ class Stage:
 
 
 def nearest(boxes: Boxes, a: int | np.integer, xy: Float64[np.ndarray, "2"], count: int) -> list[int]:
-    """The boxes of arena a in use, those nearest to a point first, at most `count`."""
+    """The boxes of arena a in use, at most `count`, nearest to a point first."""
     used = np.flatnonzero(boxes.used[a])
     if len(used) <= count:
         return used.tolist()

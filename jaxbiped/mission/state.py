@@ -1,4 +1,4 @@
-"""What is true of a mission at a moment, and what the robot makes of it."""
+"""The state of a mission: the true world, and the robot's beliefs."""
 
 from __future__ import annotations
 
@@ -25,39 +25,39 @@ from jaxbiped.sensing.edges import Edge, unknown
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Planned:
-    """What is told of a mission's planning."""
+    """Statistics of a mission's planning."""
 
-    seconds: Float[Array, "*B"]  # [s] that it took; NaN where that is not known
+    seconds: Float[Array, "*B"]  # [s] time taken; NaN if not known
     calls: Int[Array, "*B"]
-    cost: Float[Array, "*B"]  # by Eq. 1, of the first way that was found; NaN where that is not known
+    cost: Float[Array, "*B"]  # by Eq. 1, of the first path found; NaN if not known
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class WorldState:
-    """The referee's side: only sensors and executors read it, the robot never does."""
+    """The referee's side: read only by sensors and executors, never by the robot."""
 
-    pose: Pose  # where the robot stands
+    pose: Pose  # true pose of the robot
     squat: Bool[Array, "*B"]  # its stance
     distance: Float[Array, "*B"]  # [m] walked
     time: Float[Array, "*B"]  # [s]
     measurements: Int[Array, "*B"]
     decisions: Int[Array, "*B"]
     code: Int[Array, "*B"]  # Code
-    seed: UInt32[Array, "*B"]  # of all noise of this mission
-    pose_error: Float[Array, "*B"]  # [m] from where the robot believes to stand
-    yaw_error: Float[Array, "*B"]  # [rad] the same of its yaw, without sign
+    seed: UInt32[Array, "*B"]  # seed of all noise of this mission
+    pose_error: Float[Array, "*B"]  # [m] distance from the believed position
+    yaw_error: Float[Array, "*B"]  # [rad] the same for yaw, without sign
     planned: Planned
-    before: Pose | None = None  # where it stood one command earlier; only where its motion is measured
-    metrics: tuple = ()  # what each metric of the settings remembers
+    before: Pose | None = None  # its pose one command earlier; only if its motion is measured
+    metrics: tuple = ()  # state of each metric of the settings
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class BodyPose:
-    """How a robot really holds its body: the robot frame that its cameras are fixed to.
+    """The true pose of a robot's body: of the robot frame to which its cameras are fixed.
 
-    In the home posture it is the frame of the feet; else it is that frame moved and tilted as the torso is.
+    In the home posture it is the frame of the feet; otherwise that frame, moved and tilted like the torso.
     """
 
     pose: Pose  # its origin and yaw
@@ -68,13 +68,13 @@ class BodyPose:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Anchor:
-    """What a robot that goes by what it sees, and not by landmarks, measures its motion from: its last view."""
+    """The last view, from which a robot without landmarks measures its motion."""
 
-    belief: Belief  # after it
-    look: Bool[Array, "*B"]  # how the camera was held
+    belief: Belief  # belief after that view
+    look: Bool[Array, "*B"]  # whether the camera looked down
     squat: Bool[Array, "*B"]
-    moved: Float[Array, "*B 3"]  # dx, dy [m], dyaw [rad] since, by odometry
-    variances: Float[Array, "*B 3"]  # of that
+    moved: Float[Array, "*B 3"]  # dx, dy [m], dyaw [rad] since then, by odometry
+    variances: Float[Array, "*B 3"]  # variances of `moved`
     some: Bool[Array, "*B"]  # False before the first view
 
 
@@ -83,26 +83,26 @@ class Anchor:
 class AgentState:
     """The robot's side. The stance is known to both."""
 
-    belief: Belief  # pose and its covariance; pose.z is the height of the ground that it stands on
+    belief: Belief  # pose and its covariance; pose.z is the height of the ground under the robot
     grid_map: GridMap
     squat: Bool[Array, "*B"]
-    look: Bool[Array, "*B"]  # the next measurement looks down before the feet
-    tries: Int[Array, "*B"]  # measurements in a row that showed no path
-    fresh: Bool[Array, "*B"]  # nothing measured yet: whatever the map holds is of no mission of this robot
-    ahead: Edge  # of the ground, that the robot is about to cross; only where footing counts
-    behind: Edge  # that it crossed last
+    look: Bool[Array, "*B"]  # the next measurement looks down in front of the feet
+    tries: Int[Array, "*B"]  # successive measurements without a path
+    fresh: Bool[Array, "*B"]  # nothing measured yet: the map's content is from another mission
+    ahead: Edge  # ground edge that the robot is about to cross; only with foot placement
+    behind: Edge  # the edge crossed last
     since: Float[Array, "*B"]  # [s] from the last measurement to the next
     planned: Planned
-    plan_state: Any = None  # of its planner
-    anchor: Anchor | None = None  # only where its motion is measured
-    outlines: Outlines | None = None  # of walls; only where it localises by these
+    plan_state: Any = None  # state of its planner
+    anchor: Anchor | None = None  # only if its motion is measured
+    outlines: Outlines | None = None  # wall outlines; only if it localises by them
 
 
 @with_own_settings
 def start(
     arena: Arena, settings: MissionParams, seed: UInt32[Array, ""], spec: GridSpec, localisation: str = "landmarks"
 ) -> tuple[WorldState, AgentState]:
-    """One mission before its first measurement. The robot knows where it starts (paper, 2, condition 2)."""
+    """One mission before its first measurement. The robot knows its initial pose (paper, 2, condition 2)."""
     x, y, yaw = arena.start_xyyaw
     pose = Pose(x, y, ground_height(arena, x, y), yaw)
     away = jnp.hypot(arena.goal_xy[0] - x, arena.goal_xy[1] - y)

@@ -1,4 +1,4 @@
-"""Strategies: what a robot plans its way by, and what it dares to step on (paper, Table 1)."""
+"""Strategies: what a robot plans with, and what it may step on (paper, Table 1)."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ NAME = re.compile(r"[A-Za-z][\w .+-]{0,39}")  # shown in tables, figures and pag
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class StrategyFlags:
-    """What a strategy dares, traced: missions of different strategies share one compiled program."""
+    """What a strategy may cross, traced: missions of different strategies share one compiled program."""
 
     bumps: Bool[Array, "*B"]  # steps over bumps; else they are obstacles
     gates: Bool[Array, "*B"]  # passes gates; else they are obstacles
-    blind: Bool[Array, "*B"]  # walks straight to the goal, and stops at what is no floor
+    blind: Bool[Array, "*B"]  # walks straight to the goal, and stops at anything but floor
     corner_cutting: Bool[Array, "*B"]
 
     def rules(self) -> Rules:
-        """For the planner."""
+        """The rules for the planner."""
         return Rules(corner_cutting=self.corner_cutting, bumps=self.bumps, gates=self.gates)
 
 
 @dataclass(frozen=True)
 class Strategy:
-    """A name, a planner, and what the robot dares.
+    """A name, a planner, and what the robot may cross.
 
     Raises:
-      InputError: a name that cannot be shown everywhere; something that is not a planner, or not a pytree.
+      InputError: a name that cannot be displayed everywhere; something that is not a planner, or not a pytree.
     """
 
     name: str
@@ -72,10 +72,10 @@ for _strategy in (
 
 
 def as_strategy(thing: object, name: str) -> Strategy:
-    """A strategy of something that stands for one: a strategy, a planner or its class, a function of NumPy arrays.
+    """The strategy given by a strategy, a planner or its class, or a function of NumPy arrays.
 
     Args:
-      name: of a strategy that has none yet.
+      name: name of a strategy that has none yet.
     """
     if isinstance(thing, Strategy):
         return thing
@@ -89,9 +89,9 @@ def as_strategy(thing: object, name: str) -> Strategy:
 
 
 def find_strategy(name: str) -> Strategy:
-    """The strategy of a name in the registry, or of `package.module:name`, which is imported.
+    """The strategy registered under a name, or imported from `package.module:name`.
 
     Raises:
-      InputError: a name that is not known, with those that are; a module that cannot be imported.
+      InputError: an unknown name, with the known ones; a module that cannot be imported.
     """
     return STRATEGIES.find(name, as_strategy)

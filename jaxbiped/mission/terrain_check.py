@@ -1,4 +1,4 @@
-"""The static part of missions in arenas of one kind, refused where a component does not know their terrain."""
+"""The static part of missions in arenas of one kind, rejected if a component does not support their terrain."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def program_for(config: MissionConfig, size_xy: tuple[float, float], terrain: He
     """See `settings.program`.
 
     Raises:
-      InputError: a pitch that does not divide the size [m]; terrain that the sensor or the executor does not know.
+      InputError: a pitch that does not divide the size [m]; terrain that the sensor or the executor does not support.
     """
     for kind, choice in (("sensor", config.sensor), ("executor", config.executor)):
         if terrain is not None and not (choice in WITH_TERRAIN[kind] or knows_terrain(kind, choice)):
@@ -22,6 +22,6 @@ def program_for(config: MissionConfig, size_xy: tuple[float, float], terrain: He
 
 
 def knows_terrain(kind: str, name: str) -> bool:
-    """Whether a sensor or an executor that somebody brought says so."""
+    """Whether a user's sensor or executor supports terrain."""
     component = find_sensor(name) if kind == "sensor" else find_executor(name)
     return component is not None and component.on_terrain

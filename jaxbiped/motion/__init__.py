@@ -1,4 +1,4 @@
-"""What the robot plays: its primitives, and which one comes next (paper, 2.4)."""
+"""What the robot plays: its primitives, and the selection of the next one (paper, 2.4)."""
 
 from jaxbiped.core.lazy_loading import lazy_package
 

@@ -1,4 +1,4 @@
-"""What may be chosen of the robot: its measures, and how long its primitives take. Light to import, without JAX."""
+"""The options of the robot: its dimensions, and the durations of its primitives. Quick to import, without JAX."""
 
 from __future__ import annotations
 
@@ -23,30 +23,30 @@ HEIGHT_TOLERANCE, STEP_TOLERANCE = 0.010, 0.002  # [m] defaults of the fields be
 
 
 class FootingConfig(Model):
-    """Where a step over an edge wants the robot to stand. The steps of the simulated biped; chosen by simulation.
+    """Where the robot should stand before a step over an edge. For the simulated biped; chosen by simulation.
 
-    Distances to an edge are from the middle between the feet. A step that is 10 cm long, from feet of 10 cm, has the
-    widest tolerance: 8 mm and 6 degrees are fine, 25 mm fails (5 cm long, it has none).
+    Distances to an edge are from the midpoint of the feet. A 10 cm long step with 10 cm long feet has the widest
+    tolerance: 8 mm and 6 degrees are fine, 25 mm fails (a 5 cm long step has no tolerance).
     """
 
     length: Length = 0.10
-    """[m] of a step over an edge."""
+    """[m] Length of a step over an edge."""
     before_up: Length = 0.075
-    """[m] that a rising edge lies ahead of the robot before its step."""
+    """[m] Distance of a rising edge ahead of the robot before its step."""
     before_down: Length = 0.025
-    """[m] that a falling edge lies ahead of the robot before its step."""
+    """[m] Distance of a falling edge ahead of the robot before its step."""
     tolerance: Length = 0.005
-    """[m] off that place, from which the robot corrects."""
+    """[m] Position error above which the robot corrects."""
     clear_up: Length = 0.075
-    """[m] beyond an edge that rose, where the robot can turn on the spot."""
+    """[m] Distance beyond a rising edge at which the robot can turn on the spot."""
     clear_down: Length = 0.10
-    """[m] beyond an edge that fell, where the robot can turn on the spot."""
+    """[m] Distance beyond a falling edge at which the robot can turn on the spot."""
     foot_length: Length = 0.10
     """[m]"""
     hip_offset: Length = 0.045
-    """[m] of a foot's middle to the side."""
+    """[m] Lateral offset of a foot's middle."""
     foot_outside: Length = 0.075
-    """[m] of a foot's outer rim to the side."""
+    """[m] Lateral offset of a foot's outer rim."""
 
     def traced(self) -> Footing:
         """The same as arrays."""
@@ -61,23 +61,23 @@ class RobotConfig(FileModel):
     """A biped as an upright cylinder that can squat (paper, 2.2, Fig. 4); by default the e-nuvo WALK of the paper."""
 
     radius: Annotated[float, pydantic.Field(gt=0.0, le=0.15)] = 0.10
-    """[m] of the cylinder that obstacles are grown by: the body, and a margin for pose errors. With simulated bipeds,
-    which sway as they walk, 0.125 by default."""
+    """[m] Radius of the cylinder by which obstacles are grown: the body, and a margin for pose errors. By default 0.125
+    with simulated bipeds, which sway as they walk."""
     body_radius: Annotated[float, pydantic.Field(gt=0.0, le=0.15)] = 0.08
-    """[m] of the cylinder that really collides."""
+    """[m] Radius of the cylinder that really collides."""
     standing: Length = 0.385
-    """[m] head height, standing."""
+    """[m] Head height, standing."""
     squatting: Length = 0.340
-    """[m] head height, squatting."""
+    """[m] Head height, squatting."""
     step: Annotated[float, pydantic.Field(gt=0.0, le=0.1)] = 0.03
-    """[m] greatest height of one step up or down."""
+    """[m] Greatest height of one step up or down."""
     height_tolerance: Tolerance = HEIGHT_TOLERANCE
-    """[m] that ground may be off the height that is stepped to: the map takes ground further off its level for an
-    obstacle. In missions that of the executor (`limits.height_tolerance`), by default."""
+    """[m] Largest deviation of the ground from the height stepped to: the map treats ground farther from its level as
+    an obstacle. In missions, by default that of the executor (`limits.height_tolerance`)."""
     step_tolerance: Tolerance = STEP_TOLERANCE
-    """[m] that ground may be higher than a step: the map takes what is higher for an obstacle."""
+    """[m] By how much ground may exceed a step: the map treats anything higher as an obstacle."""
     footing: FootingConfig = FootingConfig()
-    """Where its feet want to be before an edge; read where footing counts (simulated bipeds)."""
+    """Where its feet should be before an edge; used with foot placement (simulated bipeds)."""
 
     @pydantic.model_validator(mode="after")
     def _order(self):
@@ -88,7 +88,7 @@ class RobotConfig(FileModel):
         return self
 
     def body(self) -> Body:
-        """What the map needs of it, traced."""
+        """What the map needs to know about it, traced."""
         import jax.numpy as jnp
 
         from jaxbiped.mapping.grid import Body
@@ -111,7 +111,7 @@ class DurationConfig(Model):
     step_down: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 96.0
     """[s] for one step of 3 cm down, 5 cm forward."""
     pass_gate: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 48.0
-    """[s] for 5 cm forward, squatting; getting down and up is in it."""
+    """[s] for 5 cm forward, squatting; includes getting down and up."""
     measure: Annotated[float, pydantic.Field(ge=0.0, le=3600.0)] = 10.0
     """[s] for one stereo measurement."""
 

@@ -8,7 +8,7 @@ from jaxtyping import Array, Float, Int
 
 from jaxbiped.mapping.grid import Cell
 
-WINDOW = 0.20  # [m] half side of the square of cells that the direction is fitted to; four cells of 5 cm
+WINDOW = 0.20  # [m] half side of the square of cells used to fit the direction; four cells of 5 cm
 
 
 def crossing_direction(
@@ -19,11 +19,11 @@ def crossing_direction(
     rise: Int[Array, ""],
     pitch: float,
 ) -> Float[Array, ""]:
-    """World direction [rad] square to the bump's edge, over it, between a cell and its neighbour (paper, 2.4).
+    """World direction [rad] perpendicular to the bump's edge between a cell and its neighbour, across it (paper, 2.4).
 
     Around the edge, cells on the robot's level count -1 and cells on the level beyond count +1; the first moment of
-    that pattern points square to the edge. Cells of other levels, obstacles and unmeasured cells do not count.
-    The paper does not say how it measures the direction; this reads it off the classed grid, never off the truth.
+    that pattern is perpendicular to the edge. Cells of other levels, obstacles and unmeasured cells do not count.
+    The paper does not say how it measures the direction; here it is read from the classed grid, never from the truth.
 
     Args:
       ij: the robot's cell; `step_ij` the move (di, dj) to the neighbour on the other level.
@@ -31,7 +31,7 @@ def crossing_direction(
       pitch: static [m].
 
     Returns:
-      The direction; that of the move itself where the pattern shows no edge within 50 degrees of it.
+      The direction; that of the move itself if the pattern shows no edge within 50 degrees of it.
     """
     half = max(1, round(WINDOW / pitch))
     side = 2 * half + 1
@@ -41,7 +41,7 @@ def crossing_direction(
     pattern = jnp.where(known & (relative == rise), 1.0, 0.0) - jnp.where(known & (relative == 0), 1.0, 0.0)
     window = jax.lax.dynamic_slice(jnp.pad(pattern, half), (ij[0], ij[1]), (side, side))
     offset = jnp.arange(-half, half + 1, dtype=jnp.float32)
-    # The edge lies half a move beyond the robot's cell: moments about that point, in a disc, lest corners pull.
+    # The edge lies half a move beyond the robot's cell: moments about that point, in a disc, to avoid bias by corners.
     di = offset[:, None] - 0.5 * step_ij[0]
     dj = offset[None, :] - 0.5 * step_ij[1]
     weight = window * (jnp.hypot(di, dj) <= half)

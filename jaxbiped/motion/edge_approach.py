@@ -1,8 +1,8 @@
-"""Foot placement: from the planned path to commands that bring the feet where a step over an edge wants them.
+"""Foot placement: from the planned path to commands that bring the feet to the right place before a step over an edge.
 
-The map is good to half a cell, a step over an edge to a few millimetres. So the robot walks its path on cells until an
-edge is near, turns square to it, walks up to it along its normal, looks at it once more, and steps. Each command starts
-from where the edge was measured to lie, which feeds the error of the last one back.
+The map is accurate to half a cell, but a step over an edge needs a few millimetres. So the robot walks its path on
+cells until an edge is near, turns perpendicular to it, walks up to it along its normal, looks at it once more, and
+steps. Each command starts from the measured position of the edge, which corrects the error of the previous one.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning import DIRECTIONS
 from jaxbiped.sensing.edges import Edge, prior_cov
 
-FORESIGHT = 0.30  # [m] of path that is searched for an edge
+FORESIGHT = 0.30  # [m] length of path that is searched for an edge
 NEAR = 0.165  # [m] from the edge, the robot leaves its path for the edge's normal
-STAGE = 0.12  # [m] from the edge, it stops and measures again where it has not measured well
-ASKEW = 0.05  # [rad] off the normal, it turns before it walks to the edge
+STAGE = 0.12  # [m] from the edge, it stops and measures again if the measurement is poor
+ASKEW = 0.05  # [rad] deviation from the normal above which it turns before it walks to the edge
 RESIDUAL = 0.025  # [rad] a smaller turn is not worth playing before a step
-LARGE = 0.2  # [rad] a turn from which the feet sweep over what lies beside them
-SIDESTEP = 0.015  # [m] a smaller one is not worth playing
-SURE_DISTANCE, SURE_ANGLE = 0.0028, 0.035  # [m, rad] standard deviations of an edge that is stepped over without a look
-SLACK = 0.01  # [m] kept between the feet and an edge that they do not step over
-LANES = np.array([0.0, 0.025, -0.025, 0.05, -0.05, 0.075, -0.075, 0.10, -0.10], np.float32)  # [m] to the side, tried
-SAME_PLACE, SAME_ANGLE = 0.08, 1.0  # [m, rad] that the map may have an edge off the place where it was measured
-IN_VIEW = 1.0  # [rad] off the heading, up to which an edge shows when the robot looks down
-STEADY = 0.09  # [rad] standard deviation of an edge's angle, above which it is measured again before a turn
+LARGE = 0.2  # [rad] turns above this sweep the feet over the ground beside them
+SIDESTEP = 0.015  # [m] a smaller sidestep is not worth playing
+SURE_DISTANCE, SURE_ANGLE = 0.0028, 0.035  # [m, rad] standard deviations below which an edge is crossed without a look
+SLACK = 0.01  # [m] distance kept between the feet and an edge that they do not cross
+LANES = np.array([0.0, 0.025, -0.025, 0.05, -0.05, 0.075, -0.075, 0.10, -0.10], np.float32)  # [m] to the side, as tried
+SAME_PLACE, SAME_ANGLE = 0.08, 1.0  # [m, rad] largest deviation of the map's edge from its measured position
+IN_VIEW = 1.0  # [rad] angle from the heading within which an edge is visible when the robot looks down
+STEADY = 0.09  # [rad] standard deviation of an edge's angle above which it is measured again before a turn
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Crossing:
-    """The next edge on the path, as the map has it."""
+    """The next edge on the path, according to the map."""
 
-    edge: Edge  # the line, in the robot frame; `known` where there is one within FORESIGHT
+    edge: Edge  # the line, in the robot frame; `known` if there is one within FORESIGHT
     along: Float[Array, "*B"]  # [m] to the left of the robot, along the edge, where the path crosses it
 
 
 def foresight(spec: GridSpec) -> int:
-    """How many moves of the path are looked at."""
+    """Number of moves of the path that are examined."""
     return max(1, round(FORESIGHT / spec.pitch))
 
 
@@ -60,7 +60,7 @@ def next_crossing(
     levels: Int[Array, "H W"],
     spec: GridSpec,
 ) -> Crossing:
-    """The first edge that a path crosses before it enters what is unmeasured.
+    """The first edge that a path crosses before it enters unmeasured cells.
 
     Args:
       directions: first moves of the path, indices into DIRECTIONS; -1 after its end.
@@ -83,10 +83,10 @@ def next_crossing(
 
 
 def remembered(edge: Edge, crossing: Crossing) -> Edge:
-    """An edge measured before, known only where it is the one that the path crosses."""
+    """An edge measured before, known only if it is the one that the path crosses."""
     there = crossing.edge
     turned = wrap_angle(there.angle - edge.angle)
-    # How far the path's crossing lies off the line.
+    # Distance of the path's crossing from the line.
     off = there.distance * jnp.cos(turned) - crossing.along * jnp.sin(turned) - edge.distance
     same = (edge.rise == there.rise) & (jnp.abs(turned) < SAME_ANGLE) & (jnp.abs(off) < SAME_PLACE)
     return replace(edge, known=edge.known & there.known & same)
@@ -109,11 +109,11 @@ def approach(
     """The command that takes the robot along its path, and over an edge only from the right place before it.
 
     Args:
-      command: what `selection.select` wants; it is played as long as no edge is near.
-      crossing: the next edge on the path, as the map has it.
-      measured: the same edge, as it was measured; where it is not known, the map's is used.
-      held: the edge that it was about to cross when it decided last, which its path may have left.
-      behind: the edge that the robot came over; it does not turn much before its feet are clear of it.
+      command: the command from `selection.select`; it is played as long as no edge is near.
+      crossing: the next edge on the path, according to the map.
+      measured: the same edge, as measured; if not known, the map's is used.
+      held: the edge that it was about to cross at its last decision, which its path may have left.
+      behind: the edge that the robot crossed; it does not turn much before its feet are clear of it.
       looked: the robot has just looked down from here.
     """
     edge = jax.tree.map(lambda m, c: jnp.where(measured.known, m, c), measured, crossing.edge)
@@ -130,14 +130,14 @@ def approach(
     cos = jnp.where(jnp.cos(angle) < 0, -1.0, 1.0) * jnp.maximum(jnp.abs(jnp.cos(angle)), 0.5)
     retreat = jnp.clip((s - room) / cos, -0.06, 0.06)
     tight = askew & (s < room - 0.003)
-    # Turned square to it, the robot walks as far as it trusts the line.
+    # Once perpendicular to it, the robot walks as far as it trusts the line.
     vague = ~measured.known | (sd_angle > STEADY)
     ahead = jnp.where(vague & askew, 0.0, jnp.where(sure | (s < STAGE + 0.02), gap, s - STAGE))
     aside = ~askew & (jnp.abs(lane) > SIDESTEP) & (measured.known | looked)
     off = jnp.abs(gap) > footing.tolerance
     ready = ~askew & ~aside & ~off & (sure | looked)
     look = ~askew & ~aside & ~off & ~sure & ~looked
-    # Before it moves by a line that only the map knows, it looks.
+    # Before it relies on a line that only the map knows, it looks.
     look = look | (~measured.known & ~looked & (jnp.abs(angle) < IN_VIEW))
 
     turn = jnp.where((askew & ~look) | (ready & (jnp.abs(angle) > RESIDUAL)), angle, 0.0)
@@ -165,9 +165,9 @@ def approach(
 
 
 def turning_room(angle: Float[Array, ""], up: Bool[Array, ""], footing: Footing) -> Float[Array, ""]:
-    """How far [m] before an edge the robot must stand to turn by `angle` to its normal.
+    """Distance [m] before an edge at which the robot must stand to turn by `angle` to its normal.
 
-    Before one that rises no corner of a foot may reach it, before one that falls no ankle.
+    Before a rising edge no corner of a foot may reach it, before a falling one no ankle.
     """
     cos, sin = jnp.abs(jnp.cos(angle)), jnp.abs(jnp.sin(angle))
     toes = footing.foot_length / 2 * cos + footing.foot_outside * sin + SLACK
@@ -184,7 +184,7 @@ def best_lane(
     levels: Int[Array, "H W"],
     spec: GridSpec,
 ) -> Float[Array, ""]:
-    """How far [m] to the left the robot had better cross the edge: as little as the map allows."""
+    """How far [m] to the left the robot should cross the edge: as little as the map allows."""
     here, along = levels[ij[0], ij[1]].astype(jnp.int32), jnp.asarray(LANES)
     landing = footing.length - jnp.where(edge.rise > 0, footing.before_up, footing.before_down)
     before = jnp.where(edge.rise > 0, jnp.array([-0.07, -0.04]), jnp.array([-0.04, -0.04]))
@@ -221,11 +221,11 @@ def clear_of(
     footing: Footing,
     spec: GridSpec,
 ) -> Command:
-    """The command, or a straight walk away from the edge behind where the command turns too close to it."""
+    """The command, or a straight walk away from the edge behind if the command turns too close to it."""
     clear = jnp.where(behind.rise > 0, footing.clear_up, footing.clear_down)
     short = jnp.clip(clear + behind.distance, 0.0, 0.06)
     turns = (jnp.abs(command.turn) > LARGE) & (command.primitive != Primitive.LOOK)
-    # Where it would come to stand, and where its toes would be.
+    # Where it would end, and where its toes would be.
     ahead = jnp.stack([short, short + 0.05])
     i, j = cell_of(*to_world(pose, ahead, jnp.zeros_like(ahead)), spec)
     level = jnp.round(pose.z / spec.level_height)
@@ -243,7 +243,7 @@ def clear_of(
 
 
 def back_off(held: Edge, command: Command, footing: Footing) -> Command:
-    """The command, or some steps backward where it turns too close to an edge ahead that it does not cross."""
+    """The command, or some steps backward if it turns too close to an edge ahead that it does not cross."""
     turns = (jnp.abs(command.turn) > LARGE) & (command.primitive != Primitive.LOOK)
     ends = wrap_angle(held.angle - command.turn)
     room = jnp.maximum(turning_room(ends, held.rise > 0, footing), turning_room(held.angle, held.rise > 0, footing))
@@ -261,7 +261,7 @@ def back_off(held: Edge, command: Command, footing: Footing) -> Command:
 
 
 def short_of(crossing: Crossing, s: Float[Array, ""], angle: Float[Array, ""], command: Command) -> Command:
-    """The command, shortened so that a walk askew ends well before the next edge."""
+    """The command, shortened so that a skewed approach ends well before the next edge."""
     towards = jnp.cos(wrap_angle(angle - command.turn))
     most = jnp.where(crossing.edge.known & (towards > 0.1), (s - 0.10) / jnp.maximum(towards, 0.1), jnp.inf)
     straight = command.primitive == Primitive.STRAIGHT_FORWARD

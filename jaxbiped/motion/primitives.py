@@ -53,8 +53,8 @@ class Durations:
 def duration(command: Command, durations: Durations) -> Float[Array, "*B"]:
     """Time [s] that a command takes (Table 2): turns by angle, straight and gate by length, steps by event.
 
-    A step over a bump carries the robot up to one diagonal cell forward; what is longer is walked straight. Steps to
-    the side and backward, which Table 2 does not have, take as long as forward ones.
+    A step over a bump carries the robot up to one diagonal cell forward; any further distance is walked straight. Steps
+    sideways and backward, which are not in Table 2, take as long as forward ones.
     """
     cells = jnp.abs(command.length) / CELL
     beyond = jnp.maximum(cells - math.sqrt(2.0), 0.0) * durations.straight

@@ -1,4 +1,4 @@
-"""The robot's measures, as the map and the referee need them."""
+"""The robot's dimensions, as needed by the map and the referee."""
 
 from __future__ import annotations
 

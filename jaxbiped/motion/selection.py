@@ -15,16 +15,16 @@ from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.planning import DIRECTIONS
 
 TURN_DEADBAND = 0.04  # [rad] smaller turns are not worth playing: 2 mm at the end of a cell
-SHORTEST = 0.02  # [m] of a forward primitive
+SHORTEST = 0.02  # [m] shortest forward primitive
 
 
 def stride(spec: GridSpec) -> int:
-    """How many cells one primitive of 5 cm covers; 1 on the paper's pitch and on coarser ones."""
+    """Number of cells that one primitive of 5 cm covers; 1 on the paper's pitch and on coarser ones."""
     return max(1, round(CELL / spec.pitch))
 
 
 def cell_of(x: Float[Array, "*S"], y: Float[Array, "*S"], spec: GridSpec) -> Int[Array, "2 *S"]:
-    """The cell (i, j) that holds each point [m]; points outside give the nearest cell."""
+    """The cell (i, j) that contains each point [m]; points outside give the nearest cell."""
     height, width = spec.shape
     i = jnp.clip(jnp.floor(y / spec.pitch), 0, height - 1)
     j = jnp.clip(jnp.floor(x / spec.pitch), 0, width - 1)
@@ -42,14 +42,14 @@ def select(
 ) -> Command:
     """The command that takes the robot along the first moves of its path.
 
-    The robot turns to the next cell's centre and walks there, which also takes out what it stands off its own
-    cell's centre. An edge of a bump is crossed square to it. A gate is passed squatting. Before an unmeasured
-    cell, the robot turns to it and looks down, once: the additional measurement that C4 stands for (paper, 2.3).
-    Where `stride` is above 1, cells that lie in one line and are of one kind are walked as one primitive.
+    The robot turns to the next cell's centre and walks there, which also corrects its offset from its own cell's
+    centre. An edge of a bump is crossed perpendicularly. A gate is passed squatting. Before an unmeasured cell, the
+    robot turns to it and looks down, once: the additional measurement that C4 stands for (paper, 2.3). If `stride` is
+    above 1, cells in one line and of one kind are walked as one primitive.
 
     Args:
-      pose: where the robot believes to stand.
-      ij: its cell, whose level is the level that it stands on.
+      pose: the believed pose.
+      ij: its cell, on whose level the robot stands.
       directions: first moves of the path, indices into DIRECTIONS; -1 after its end. The first must be a move.
       looked: the robot has already looked down from here.
     """
@@ -72,7 +72,7 @@ def select(
     distance = jnp.hypot(dx, dy)
     towards = jnp.where(distance > SHORTEST, jnp.arctan2(dy, dx), ahead)
 
-    # Over an edge: square to it, and as deep beyond it as the next cell's centre lies.
+    # Over an edge: perpendicular to it, and as far beyond it as the next cell's centre.
     square = crossing_direction(classes, levels, ij, step_ij, rise, spec.pitch)
     depth = dx * jnp.cos(square) + dy * jnp.sin(square)
 

@@ -1,8 +1,8 @@
-"""What every physics backend is: batches of simulations of one model, stepped together.
+"""The protocol of physics backends: batches of simulations of one model, stepped together.
 
 A backend is made for one (model, batch size). `rollout` plays whole control tables; `reset`, `set_fields` and `advance`
-keep a batch alive and step it in short slices, so that its simulations may be at different places of different tables.
-Backends know MJCF and nothing of any robot.
+keep a batch alive and step it in short slices, so that its simulations may be at different positions of different
+tables. Backends know MJCF, but no particular robot.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ WARNINGS = (
     "bad_ctrl",
     "engine_error",
 )
-"""What may go wrong in a simulation, by column of `warnings`: the warnings of MuJoCo, in its order, and its errors."""
+"""Possible failures of a simulation, by column of `warnings`: MuJoCo's warnings, in its order, and its errors."""
 
-LIMIT = mujoco.mjMAXVAL  # a state beyond it is as bad as NaN, as it is to the engine itself
+LIMIT = mujoco.mjMAXVAL  # a state beyond it is as bad as NaN, also for the engine itself
 
 
 @jax.tree_util.register_dataclass
@@ -49,17 +49,17 @@ class State:
     sensordata: Float[np.ndarray, "B ns"]  # the model's own sensors, in its order
     valid: Bool[np.ndarray, "B"]  # no warning since its reset
     warnings: Int[np.ndarray, "B 8"]  # how often, by the names of WARNINGS
-    touched: Bool[np.ndarray, "B W"]  # whether any pair of the watch did, in this slice
-    depth: Float[np.ndarray, "B W"]  # [m] greatest penetration of the watch's pairs in this slice; 0: none
-    work: Float[np.ndarray, "B nw"]  # [J] that each actuator gave in this slice, braking not counted; nw = 0 or nu
+    touched: Bool[np.ndarray, "B W"]  # whether any pair of the watch touched in this slice
+    depth: Float[np.ndarray, "B W"]  # [m] largest penetration of the watch's pairs in this slice; 0: none
+    work: Float[np.ndarray, "B nw"]  # [J] work of each actuator in this slice, without braking; nw = 0 or nu
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Rollout:
-    """What a batch did. NumPy arrays; record k is of the state after (k + 1) * record_every steps.
+    """The recorded motion of a batch. NumPy arrays; record k is of the state after (k + 1) * record_every steps.
 
-    Records at and after a simulation's first warning are NaN: no number is given for what is not valid.
+    Records at and after a simulation's first warning are NaN: invalid states have no numbers.
     """
 
     time: Float[np.ndarray, "R"]  # [s] the same for all simulations
@@ -91,12 +91,12 @@ class Backend(Protocol):
         record_every: int = 1,
         hold: int = 1,
     ) -> Rollout:
-        """Play control tables from given initial states, and leave the living batch as it is.
+        """Play control tables from given initial states, and leave the living batch unchanged.
 
         Args:
           controls: [B, T, nu], finite; control k is applied in steps k * hold to (k + 1) * hold - 1.
-          qpos: [B, nq] initial positions; the model's `qpos0` where None.
-          qvel: [B, nv] initial velocities; 0 where None.
+          qpos: [B, nq] initial positions; the model's `qpos0` if None.
+          qvel: [B, nv] initial velocities; 0 if None.
           fields: model fields that differ by simulation, {name: [B, ...]}; the model's own where not named.
           record_every: steps between records; it divides the number of steps, T * hold.
           hold: steps for which each control is held.
@@ -107,43 +107,43 @@ class Backend(Protocol):
         ...
 
     def reset(self, mask: Any = None, qpos: Any = None, qvel: Any = None) -> State:
-        """Set the simulations of `mask` [B] (all where None) to a state at time 0, valid, with no warnings.
+        """Set the simulations of `mask` [B] (all if None) to a state at time 0, valid, with no warnings.
 
         Args:
           mask: [B] bool.
-          qpos: [B, nq]; rows outside the mask are ignored. The model's `qpos0` where None.
-          qvel: [B, nv]; 0 where None.
+          qpos: [B, nq]; rows outside the mask are ignored. The model's `qpos0` if None.
+          qvel: [B, nv]; 0 if None.
         """
         ...
 
     def set_fields(self, fields: Mapping[str, Any], mask: Any = None) -> None:
-        """Give the simulations of `mask` [B] (all where None) their own model fields, {name: [B, ...]}.
+        """Give the simulations of `mask` [B] (all if None) their own model fields, {name: [B, ...]}.
 
-        What MuJoCo derives from them (inertial constants, bounding volumes, frames) follows. Rows outside the mask
-        are ignored. Names are those of `mujoco.MjModel`, and "opt.gravity" and the like for options.
+        Values that MuJoCo derives from them (inertial constants, bounding volumes, frames) are updated. Rows outside
+        the mask are ignored. Names are those of `mujoco.MjModel`, and "opt.gravity" and the like for options.
         """
         ...
 
     def advance(self, controls: Any, hold: int = 1, mask: Any = None) -> State:
-        """Step the simulations of `mask` [B] (all where None) S * hold times; the others stay as they are.
+        """Step the simulations of `mask` [B] (all if None) S * hold times; the others stay unchanged.
 
-        `controls` is [B, S, nu], finite, each held for `hold` steps. What is masked costs nothing in `native`, and as
-        much as the rest in `mjx`.
+        `controls` is [B, S, nu], finite, each held for `hold` steps. Masked simulations cost nothing in `native`, and
+        as much as the others in `mjx`.
         """
         ...
 
     def compile(self) -> float:
-        """Do now what the first call would do first; returns the seconds that it took."""
+        """Compile now instead of at the first call; returns the seconds taken."""
         ...
 
 
 def explain(warnings: Sequence[int] | np.ndarray) -> str:
-    """The warnings of one simulation, [8], in words; empty where there were none.
+    """The warnings of one simulation, [8], in words; empty if there were none.
 
     Raises:
-      InputError: of another shape, or no numbers.
+      InputError: warnings of another shape, or not numbers.
     """
     counts = as_array("warnings", warnings)
     if counts.shape != (len(WARNINGS),):
-        raise InputError(f"must be [{len(WARNINGS)}], of one simulation, not {shape_of(counts)}", field="warnings")
+        raise InputError(f"must be [{len(WARNINGS)}], for one simulation, not {shape_of(counts)}", field="warnings")
     return ", ".join(f"{name} x{count}" for name, count in zip(WARNINGS, warnings, strict=True) if count)

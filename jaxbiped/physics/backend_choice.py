@@ -1,4 +1,4 @@
-"""The one way to a backend."""
+"""The factory of backends."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ def make(name: str, model: Any, batch_size: int, **options: Any) -> Backend:
     """A backend for one model and batch size.
 
     Args:
-      name: `native` (MuJoCo's batch, on a CPU), `mjx` (JAX; a GPU, TPU or CPU), or `auto`: `native` where JAX sees
-        only a CPU, or is told device="cpu", and else `mjx`.
-      model: the path of an MJCF file, MJCF text, a `mujoco.MjSpec` or a `mujoco.MjModel`. It is left as it is.
-      batch_size: simulations, B.
+      name: `native` (MuJoCo's batch, on a CPU), `mjx` (JAX; a GPU, TPU or CPU), or `auto`: `native` if JAX sees
+        only a CPU, or with device="cpu", and `mjx` otherwise.
+      model: the path of an MJCF file, MJCF text, a `mujoco.MjSpec` or a `mujoco.MjModel`. It is not modified.
+      batch_size: number of simulations, B.
       **options: `free_joint`, `watch` and `fields` of all backends (see `options.Common`); `device`: "cpu", "gpu" or
         "tpu"; `threads` of `native`; `impl` and others of `mjx` (see `mjx.Options`).
 
     Raises:
-      InputError: about an unknown name or option, a model that cannot be stepped (with what is in it that cannot), or
-        a device that is asked for and not there.
+      InputError: an unknown name or option, a model that cannot be stepped (naming the element), or a requested device
+        that does not exist.
     """
     if not isinstance(name, str) or name not in BACKENDS:
         raise InputError(f"must be one of {', '.join(BACKENDS)}", field="backend", value=name)
@@ -39,7 +39,9 @@ def make(name: str, model: Any, batch_size: int, **options: Any) -> Backend:
         from jaxbiped.physics import native
 
         if options.get("device") not in (None, "cpu"):
-            raise InputError("native runs on a CPU; mjx is for others", field="device", value=options["device"])
+            raise InputError(
+                "native runs on a CPU only; use mjx for other devices", field="device", value=options["device"]
+            )
         return native.Native(model, batch_size, settings(native.Options, options))
     from jaxbiped.physics import mjx
 
@@ -50,5 +52,5 @@ def settings(kind: type[OptionsT], options: dict[str, Any]) -> OptionsT:
     """Options, checked."""
     unknown = sorted(options.keys() - kind.model_fields.keys())
     if unknown:
-        raise InputError(f"unknown option; there are {', '.join(sorted(kind.model_fields))}", field=unknown[0])
+        raise InputError(f"unknown option; known ones are {', '.join(sorted(kind.model_fields))}", field=unknown[0])
     return parse(kind, options)

@@ -1,4 +1,4 @@
-"""A model on a device, in MJX: one step of one simulation, and what went wrong in it."""
+"""A model on a device, in MJX: one step of one simulation, and its warnings."""
 
 from __future__ import annotations
 
@@ -18,32 +18,32 @@ from jaxbiped.errors import InputError
 from jaxbiped.physics.backend import LIMIT, WARNINGS
 from jaxbiped.physics.model import REPORT
 
-with contextlib.redirect_stdout(io.StringIO()):  # it prints that MuJoCo Warp is not installed; few need to know
+with contextlib.redirect_stdout(io.StringIO()):  # it prints that MuJoCo Warp is not installed, which concerns few users
     from mujoco import mjx
 
     from jaxbiped.physics.unsupported_features import refusals
 
 SLOTS = "max_contact_points"
-GROWS = {  # sizes of a geom that a margin adds to
+GROWS = {  # sizes of a geom to which a margin is added
     mujoco.mjtGeom.mjGEOM_SPHERE: (1, 0, 0),
     mujoco.mjtGeom.mjGEOM_CAPSULE: (1, 0, 0),
     mujoco.mjtGeom.mjGEOM_CYLINDER: (1, 1, 0),
     mujoco.mjtGeom.mjGEOM_ELLIPSOID: (1, 1, 1),
     mujoco.mjtGeom.mjGEOM_BOX: (1, 1, 1),
 }
-EDGES = 6  # constraint rows a contact for which there is room in Warp: 4 of friction, and as many of joint limits
-STATE = (  # all that a step reads of the data before it
+EDGES = 6  # room for constraint rows per contact in Warp: 4 of friction, and the rest for joint limits
+STATE = (  # all that a step reads of the previous data
     *("time", "qpos", "qvel", "act", "history", "qacc_warmstart", "plugin_state", "sensordata"),
     *("ctrl", "qfrc_applied", "xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata"),
 )
-WARP_FULL = {  # bits of what overflows in Warp; those of iterations are no overflow of ours
+WARP_FULL = {  # bits of overflows in Warp; those of iterations are not counted
     "constraint_full": ("NEFC", "NJMAX_NNZ", "NVMAX"),
     "contact_full": ("BROADPHASE", "NARROWPHASE", "CCD", "HFIELD", "CONTACT_MATCH", "EPA_HORIZON", "TACTILE"),
 }
 
 
 def device_of(platform: str | None) -> jax.Device:
-    """The first device of a platform; JAX's default where it is None."""
+    """The first device of a platform; JAX's default if None."""
     try:
         return jax.devices(platform)[0]
     except RuntimeError:
@@ -54,8 +54,8 @@ def device_of(platform: str | None) -> jax.Device:
 def grow(model: mujoco.MjModel) -> np.ndarray:
     """Turn the margins of geoms into size, in place; returns what was added to each size, [ngeom, 3].
 
-    MJX finds a box on a plane only when they touch, and not within the margin: feet at rest would have contacts that
-    come and go, with forces that jump. A geom that is larger by its margin has the same forces at the same distances.
+    MJX finds a box on a plane only when they touch, and not within the margin: feet at rest would have flickering
+    contacts, with forces that jump. A geom that is larger by its margin has the same forces at the same distances.
     """
     growth = np.zeros_like(model.geom_size)
     for g, kind in enumerate(model.geom_type):
@@ -68,7 +68,7 @@ def grow(model: mujoco.MjModel) -> np.ndarray:
 
 
 def watched_distances(model: mujoco.MjModel, margin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Columns of the sensor data that are distances of two geoms, and the margins [m] of these, which `grow` took."""
+    """Columns of the sensor data that are distances of two geoms, and their margins [m], which `grow` removed."""
     columns, margins = [], []
     for s in np.flatnonzero(model.sensor_type == mujoco.mjtSensor.mjSENS_CONTACT):
         ends = {int(model.sensor_objtype[s]), int(model.sensor_reftype[s])}
@@ -81,7 +81,7 @@ def watched_distances(model: mujoco.MjModel, margin: np.ndarray) -> tuple[np.nda
 class Engine:
     """MJX's model and empty data, with one contact slot to spare.
 
-    MJX keeps the deepest `max_contact_points` contacts of each dimension and drops others unseen. With one slot more,
+    MJX keeps the deepest `max_contact_points` contacts of each dimension and silently drops others. With one more slot,
     a contact in it shows that a contact was, or would have been, dropped.
     """
 
@@ -102,7 +102,7 @@ class Engine:
         self.distances, self.taken = watched_distances(model, margin - model.geom_margin)
         try:
             self.model = mjx.put_model(model, self.device, impl)
-            # Warp's contacts are in one buffer for all simulations, its constraints in one a simulation.
+            # Warp's contacts are in one buffer for all simulations, its constraints in one per simulation.
             sizes = {"naconmax": contacts * batch_size, "njmax": EDGES * contacts} if impl == "warp" else {}
             self.empty = mjx.make_data(model, device=self.device, impl=impl, **sizes)
         except (NotImplementedError, AssertionError, RuntimeError) as error:
@@ -111,14 +111,14 @@ class Engine:
         self.impl = impl
         self.static = np.flatnonzero(model.body_weldid[model.geom_bodyid] == 0)
         self.body_of_static = model.geom_bodyid[self.static]
-        self.spare: tuple[int, ...] = ()  # contacts that must stay without contact
+        self.spare: tuple[int, ...] = ()  # contact slots that must stay empty
         if impl == "jax" and limit is not None:
             dims = np.asarray(self.empty._impl.contact.dim)
             last = [np.flatnonzero(dims == dim) for dim in np.unique(dims)]
             self.spare = tuple(int(each[-1]) for each in last if len(each) > limit)
 
     def field(self, name: str) -> Any:
-        """A field of the model on the device, or None where MJX has none of this name that may differ."""
+        """A field of the model on the device, or None if MJX has no such field that may differ."""
         if self.impl == "warp" and name in ("body_pos", "body_quat"):  # bodies that stand still are placed only once
             return None
         holder, key = (self.model.opt, name[4:]) if name.startswith("opt.") else (self.model, name)
@@ -129,11 +129,11 @@ class Engine:
         return self.empty.replace(qpos=qpos)
 
     def initial(self) -> dict[str, Array]:
-        """What a step reads of the data of one simulation, at its beginning; the step makes all else anew."""
+        """The data of one simulation that a step reads, at its beginning; the step computes everything else."""
         return {name: getattr(self.empty, name) for name in STATE if hasattr(self.empty, name)}
 
     def contact_count(self) -> int | None:
-        """Contact slots of a simulation, each of which is paid for in every step; None where they are not fixed."""
+        """Contact slots of a simulation, each of which costs time in every step; None if they are not fixed."""
         return int(self.empty._impl.ncon) if self.impl == "jax" else None
 
     def step(self, model: Any, overrides: dict[str, Array], data: Any, control: Float[Array, "nu"]) -> Any:
@@ -151,7 +151,7 @@ class Engine:
         return data
 
     def place_static(self, model: Any, data: Any) -> Any:
-        """Put static geoms where the model has them: Warp does so only when it makes its data."""
+        """Put static geoms where the model has them: Warp does so only when it creates its data."""
         body, (w, x, y, z) = self.body_of_static, model.geom_quat[self.static].T
         turned = jnp.stack(
             [
@@ -169,7 +169,7 @@ class Engine:
         )
 
     def flags(self, data: Any) -> Int[Array, "8"]:
-        """What went wrong in the last step of one simulation, by the names of WARNINGS."""
+        """The warnings of the last step of one simulation, by the names of WARNINGS."""
         wrong = {f"bad_{name}": ~jnp.all(jnp.abs(getattr(data, name)) < LIMIT) for name in ("qpos", "qvel", "qacc")}
         if self.spare:
             contact, spare = data._impl.contact, np.array(self.spare)

@@ -1,4 +1,4 @@
-"""Model fields that differ by simulation, and what MuJoCo derives from them."""
+"""Model fields that differ by simulation, and the values that MuJoCo derives from them."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class Fields:
         self.written: set[str] = set()
 
     def write(self, values: Mapping[str, Float64[np.ndarray, "B ..."]], ids: Integer[np.ndarray, "n"]) -> None:
-        """Write the rows `ids` of each field, and let all that is derived from them follow.
+        """Write the rows `ids` of each field, and update all that is derived from them.
 
-        Without the latter a box that was moved keeps its old bounding volume, and silently has no contact.
+        Without the update a box that was moved keeps its old bounding volume, and silently has no contact.
         """
         self.written |= values.keys()
         rows = {name: self.batch.expand(name) for name in values}
@@ -37,7 +37,7 @@ class Fields:
             self.batch.set_const(ids.astype(np.int32))
         except SimulationError as error:
             said = mjcf_problem(error)
-            raise InputError(f"give no possible model in simulation {error.ids[0]}: {said}", field="fields") from None
+            raise InputError(f"give an impossible model in simulation {error.ids[0]}: {said}", field="fields") from None
 
     def only(self, values: Mapping[str, Float64[np.ndarray, "B ..."]]) -> None:
         """Make these, and no others, differ from the model's own."""
@@ -51,6 +51,6 @@ class Fields:
         return np.broadcast_to(value, (self.batch.nsim, *value.shape))
 
     def rows(self, name: str) -> np.ndarray:
-        """The values of a field, [B, ...], derived ones too."""
+        """The values of a field, [B, ...], including derived ones."""
         rows = self.batch.expanded(name)
         return self.own(name) if rows is None else rows

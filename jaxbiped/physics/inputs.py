@@ -1,4 +1,4 @@
-"""Checks of what people give to a backend: one clear line before anything is stepped or compiled."""
+"""Checks of the inputs of a backend: one clear line before anything is stepped or compiled."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from mujoco.batch import MODEL_FIELDS
 from jaxbiped.errors import InputError
 
 NOT_NEGATIVE = ("body_mass", "body_inertia", "geom_size", "geom_friction", "dof_armature", "dof_frictionloss")
-MOST_STEPS = 2**31 - 1  # of one call, whose engine counts in 32 bits
-MOST_SIMULATIONS = 10_000_000  # what no memory holds
+MOST_STEPS = 2**31 - 1  # in one call: the engine counts in 32 bits
+MOST_SIMULATIONS = 10_000_000  # more than any memory holds
 
 
 def size(name: str, value: Any, least: int = 1, most: int = MOST_STEPS) -> int:
@@ -31,7 +31,7 @@ def size(name: str, value: Any, least: int = 1, most: int = MOST_STEPS) -> int:
 def numbers(
     name: str, value: Any, shape: tuple[int, ...], axes: str, mask: Bool[np.ndarray, "B"] | None = None
 ) -> Float64[np.ndarray, "..."]:
-    """`value` as finite float64 of `shape`, where -1 is any length; only the rows of the mask need be finite."""
+    """`value` as finite float64 with `shape`, where -1 is any length; only the rows of the mask need be finite."""
     if isinstance(value, jax.core.Tracer):
         message = "must be known: simulations run on the host, outside of jax.jit, jax.vmap and jax.grad"
         raise InputError(message, field=name)
@@ -65,7 +65,7 @@ def controls(value: Any, batch_size: int, model: mujoco.MjModel) -> Float64[np.n
 def state(
     qpos: Any, qvel: Any, batch_size: int, model: mujoco.MjModel, mask: Bool[np.ndarray, "B"] | None = None
 ) -> tuple[Float64[np.ndarray, "B nq"], Float64[np.ndarray, "B nv"]]:
-    """Initial states, with the model's own where none is given; rows outside the mask are not looked at."""
+    """Initial states, by default the model's own; rows outside the mask are not checked."""
     if qpos is None:
         qpos = np.tile(model.qpos0, (batch_size, 1))
     if qvel is None:
@@ -77,7 +77,7 @@ def state(
 
 
 def every(count: int, record_every: int | None, hold: int) -> tuple[int, int]:
-    """Steps a record (all of them where None) and steps a control, of a table of `count` controls."""
+    """Steps per record (all if None) and steps per control, for a table of `count` controls."""
     hold = size("hold", hold)
     steps = count * hold
     if steps > MOST_STEPS:
@@ -89,7 +89,7 @@ def every(count: int, record_every: int | None, hold: int) -> tuple[int, int]:
 
 
 def chosen(mask: Any, batch_size: int) -> Bool[np.ndarray, "B"]:
-    """A mask of simulations; all where it is None."""
+    """A mask of simulations; all if it is None."""
     if mask is None:
         return np.ones(batch_size, bool)
     try:
@@ -108,9 +108,11 @@ def own(model: mujoco.MjModel, name: str) -> np.ndarray:
 
 
 def field_name(model: mujoco.MjModel, name: str) -> str:
-    """A field that may differ by simulation: real numbers, of no consequence for sizes, time or names."""
+    """A field that may differ by simulation: real numbers that do not affect sizes, time or names."""
     if not isinstance(name, str) or name not in MODEL_FIELDS:
-        raise InputError("must be the name of a field of mujoco.MjModel that has one value a simulation", field=name)
+        raise InputError(
+            "must be the name of a field of mujoco.MjModel that can have one value per simulation", field=name
+        )
     if own(model, name).dtype.kind != "f" or name in ("opt.timestep", "numeric_data"):
         raise InputError("is the same in all simulations of a batch", field=name)
     return name
@@ -127,7 +129,7 @@ def fields(
         shape = own(model, field_name(model, name)).shape
         array = numbers(f"fields.{name}", value, (batch_size, *shape), f"[B, *{name}.shape]", mask)
         rows = array if mask is None else array[mask]
-        if name in NOT_NEGATIVE and (rows < 0).any():  # the engine would step on, and find no contact
+        if name in NOT_NEGATIVE and (rows < 0).any():  # the engine would continue, without contacts
             raise InputError("must be 0 or more", field=f"fields.{name}", value=float(rows.min()))
         out[name] = array
     return out

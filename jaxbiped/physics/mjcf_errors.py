@@ -1,4 +1,4 @@
-"""What MuJoCo's compiler found wrong with a model, as one line in the form of our own messages."""
+"""Errors of MuJoCo's compiler as one line in the form of our own messages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ PLACE = re.compile(r"Element (?:name )?'([^']*)'(?:, id \d+)?,? line (\d+)|Line 
 
 
 def mjcf_problem(error: Exception) -> str:
-    """Line, element and diagnosis of a compiler's error: "line 3, torso: mass must be positive", say."""
+    """Line, element and diagnosis of a compiler's error, such as "line 3, torso: mass must be positive"."""
     text = str(error)
     place = PLACE.search(text)
     where = []
@@ -19,7 +19,7 @@ def mjcf_problem(error: Exception) -> str:
     said = text[: place.start()] if place and place[2] else text
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     if place and place[3]:
-        lines = ["is no well-formed XML"]
+        lines = ["is not well-formed XML"]
     message = " ".join(lines)
     while (shorter := PREFIX.sub("", message)) != message:
         message = shorter

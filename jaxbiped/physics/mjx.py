@@ -1,10 +1,10 @@
 """MuJoCo XLA: the same batches in JAX, on a GPU, a TPU or a CPU, in single precision.
 
-One function steps a block of up to `block` steps, and is compiled once a (model, batch size): tables of any length, any
-`record_every` and `hold`, and living batches all run through it. It is compiled anew only when a field differs by
-simulation for the first time that the option `fields` had not named. JAX keeps what it compiled between processes in
-the folder that the environment variable JAX_COMPILATION_CACHE_DIR names: a second process then waits for the tracing
-only (3.9 s in place of 16.5 s, measured on a hopper).
+One function steps a block of up to `block` steps, and is compiled once per (model, batch size): tables of any length,
+any `record_every` and `hold`, and living batches all run through it. It is compiled again only if a field that the
+option `fields` did not name differs by simulation for the first time. JAX keeps compiled programs between processes
+in the folder that the environment variable JAX_COMPILATION_CACHE_DIR names: a second process then only waits for the
+tracing (3.9 s instead of 16.5 s, measured on a hopper).
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ from jaxbiped.physics.fields import Fields
 from jaxbiped.physics.model import Watched, load
 from jaxbiped.physics.options import Common
 
-# What MuJoCo derives from a model's inertias and frames and MJX reads; and the fields that none of it depends on.
+# Values that MuJoCo derives from a model's inertias and frames and MJX reads; and the fields that do not affect them.
 DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0", "tendon_invweight0", "actuator_acc0")
 UNDERIVED = ("geom_", "pair_", "site_", "opt.")
 
 
 class Options(Common):
-    """Of `physics.make("mjx", ...)`."""
+    """Options of `physics.make("mjx", ...)`."""
 
     device: Literal["cpu", "gpu", "tpu"] | None = None
     """None: JAX's default."""
     impl: Literal["jax", "warp"] = "jax"
-    """Who steps: MJX's own JAX, or MuJoCo Warp where the package warp-lang is installed."""
+    """Implementation: MJX's own JAX, or MuJoCo Warp if the package warp-lang is installed."""
     block: pydantic.PositiveInt = 32
     """Most steps in one call to the device. The results do not depend on it."""
     contacts: pydantic.PositiveInt = 32
-    """With impl="warp", room for so many contacts a simulation, on average over the batch."""
+    """With impl="warp", room for this many contacts per simulation, on average over the batch."""
 
 
 class Mjx:
@@ -60,17 +60,17 @@ class Mjx:
         self.engine = Engine(self.model, self.batch_size, options.impl, options.device, options.contacts)
         self.names: tuple[str, ...] = ()  # fields that differ by simulation in the compiled function
         self.add_names(options.fields)
-        # The fields of the living batch, and of rollouts, which leave it as it is.
+        # The fields of the living batch, and of rollouts, which leave it unchanged.
         self.living: Fields | None = None
         self.scratch: Fields | None = None
         self.overrides: dict[str, Array] | None = None  # of the living batch; None: to be made
-        self.traces = 0  # of the one function that is dear to compile
+        self.traces = 0  # of the one function that is expensive to compile
         self.block = jax.jit(self.traced_block)
         self.start = jax.jit(self.traced_start)
         self.keep = jax.jit(self.traced_keep)
         with jax.default_device(self.engine.device):
             data = jax.jit(jax.vmap(self.engine.at))(np.tile(self.model.qpos0, (self.batch_size, 1)))
-            # Bound to the device, as all that comes out of a block is: XLA would compile the block again for the rest.
+            # Bound to the device, like all outputs of a block: otherwise XLA would compile the block again.
             self.data = jax.device_put(data, self.engine.device)
             self.warned = self.unwarned()
         self.steps = np.zeros(self.batch_size, np.int64)  # since each reset
@@ -103,7 +103,7 @@ class Mjx:
             data, warned, depth, work, rows = self.block(
                 self.engine.model, overrides, data, warned, depth, work, block, np.int32(steps)
             )
-            # The device goes on with this block while the records of the one before are copied.
+            # The device runs this block while the records of the previous one are copied.
             self.collect(records, every, waiting)
             waiting = begin, steps, rows
         self.collect(records, every, waiting)
@@ -194,7 +194,7 @@ class Mjx:
     def blocks(
         self, table: Float64[np.ndarray, "B T nu"], hold: int
     ) -> Iterator[tuple[int, int, Float[np.ndarray, "L B nu"]]]:
-        """A table in blocks of one length: first step, number of steps, controls padded with zeros."""
+        """A table in blocks of equal length: first step, number of steps, controls padded with zeros."""
         length, steps = self.options.block, table.shape[1] * hold
         for begin in range(0, steps, length):
             count = min(length, steps - begin)
@@ -206,7 +206,7 @@ class Mjx:
     def collect(
         records: Float[np.ndarray, "B R row"], every: int, block: tuple[int, int, Float[Array, "L B row"]] | None
     ) -> None:
-        """Copy what is to be recorded of a block of steps, if there is one."""
+        """Copy the values to record from a block of steps, if there is one."""
         if block is None:
             return
         begin, count, rows = block
@@ -238,7 +238,7 @@ class Mjx:
             data, warned, depth, work, rows = carry
             valid = ~jnp.any(warned, axis=1)
             data, flags, touching, power, row = jax.vmap(one)(overrides, data, controls[k])
-            warned = warned + flags * valid[:, None]  # its first warnings only, as with the engine in C
+            warned = warned + flags * valid[:, None]  # its first warnings only, as in the C engine
             valid = ~jnp.any(warned, axis=1)[:, None]
             depth = jnp.where(valid, jnp.maximum(depth, touching), depth)
             work = work + jnp.where(valid, power * model.opt.timestep, jnp.nan)
@@ -248,7 +248,7 @@ class Mjx:
         return jax.lax.fori_loop(0, steps, step, (data, warned, depth, work, rows))
 
     def traced_start(self, mask: Array, data: Any, qpos: Float[Array, "B nq"], qvel: Float[Array, "B nv"]) -> Any:
-        """The data of a batch with the simulations of a mask at the beginning."""
+        """The data of a batch, with the simulations of a mask at their initial states."""
         fresh = self.engine.initial() | {"qpos": qpos, "qvel": qvel}
 
         def choose(name: str, value: Array) -> Array:
@@ -258,7 +258,7 @@ class Mjx:
         return data.replace(**{name: choose(name, value) for name, value in fresh.items()})
 
     def traced_keep(self, mask: Array, new: Any, old: Any, *others: tuple[Array, Array]) -> tuple:
-        """The data of a batch where only the simulations of a mask have gone on; and arrays [B, ...] likewise."""
+        """The data of a batch in which only the simulations of a mask have advanced; likewise arrays [B, ...]."""
 
         def choose(a: Array, b: Array) -> Array:
             return jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b)
@@ -267,7 +267,7 @@ class Mjx:
         return data, *(choose(a, b) for a, b in others)
 
     def state(self, depth: Float[Array, "B W"], work: Float[Array, "B nw"]) -> State:
-        """A copy of the living batch as it is."""
+        """A copy of the living batch."""
         warned, depth = np.asarray(self.warned), np.asarray(depth)
         valid = ~warned.any(axis=1)
         blank = np.where(valid, 0.0, np.nan)[:, None].astype(self.data.qpos.dtype)

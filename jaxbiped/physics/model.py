@@ -1,4 +1,4 @@
-"""MJCF to a model that can be stepped in batches, with the contacts that are to be watched."""
+"""Compile MJCF to a model that can be stepped in batches, with sensors for the watched contacts."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from jaxbiped.physics.mjcf_errors import mjcf_problem
 Watches = Mapping[str, Sequence[tuple[str, str]]]
 
 REPORT = sum(1 << int(f) for f in (mujoco.mjtConDataField.mjCONDATA_FOUND, mujoco.mjtConDataField.mjCONDATA_DIST))
-WORK = "work/"  # before the names of sensors of actuators
-PREFIX = "watch/"  # of the sensors that watch contacts; they come after the model's own
+WORK = "work/"  # prefix of the names of actuator sensors
+PREFIX = "watch/"  # prefix of the contact sensors; they come after the model's own sensors
 
 
 def load(source: Any, *, free_joint: bool = False, watch: Watches | None = None, work: bool = False) -> mujoco.MjModel:
     """Compile a model.
 
     Args:
-      source: the path of an MJCF file, MJCF text, a `mujoco.MjSpec`, or a `mujoco.MjModel`. It is left as it is.
+      source: the path of an MJCF file, MJCF text, a `mujoco.MjSpec`, or a `mujoco.MjModel`. It is not modified.
       free_joint: whether the model must have a free joint.
-      watch: {name: pairs of geom names}: contacts to be watched. For each pair the model gets a contact sensor, after
-        its own ones, so a `mujoco.MjModel` cannot be given.
-      work: whether the model gets sensors of each actuator's force and velocity, too.
+      watch: {name: pairs of geom names}: contacts to watch. For each pair the model gets a contact sensor, after its
+        own ones, so a `mujoco.MjModel` cannot be given.
+      work: whether the model also gets sensors of each actuator's force and velocity.
 
     Raises:
-      InputError: when it cannot be read, parsed or compiled, has no free joint, or lacks a watched geom.
+      InputError: if it cannot be read, parsed or compiled, has no free joint, or lacks a watched geom.
     """
     file = None
     if isinstance(source, mujoco.MjModel):
         for field, wanted in (("watch", watch), ("work", work)):
             if wanted:
-                message = "sensors are added to MJCF or a mujoco.MjSpec, not to a compiled model"
+                message = "sensors can be added to MJCF or a mujoco.MjSpec, not to a compiled model"
                 raise InputError(message, field=field)
         model = copy.copy(source)
     else:
@@ -50,16 +50,18 @@ def load(source: Any, *, free_joint: bool = False, watch: Watches | None = None,
                 add_power(spec)
             model = spec.compile()
         except ValueError as error:
-            raise InputError(f"is no valid model: {mjcf_problem(error)}", file=file) from None
+            raise InputError(f"is not a valid model: {mjcf_problem(error)}", file=file) from None
     if (watch or work) and model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SENSOR:
-        raise InputError("must not be disabled: contacts and work are told by sensors", file=file, field="flag.sensor")
+        raise InputError(
+            "must not be disabled: contacts and work are measured by sensors", file=file, field="flag.sensor"
+        )
     if free_joint and mujoco.mjtJoint.mjJNT_FREE not in model.jnt_type:
         raise InputError("the model must have a free joint", file=file, field="joint")
     return model
 
 
 def read(source: Any) -> tuple[mujoco.MjSpec, Path | None]:
-    """A specification of the caller's own, and the file that it came from."""
+    """A specification that may be modified, and the file that it came from."""
     if isinstance(source, mujoco.MjSpec):
         return source.copy(), None
     if isinstance(source, str) and source.lstrip().startswith("<"):
@@ -79,7 +81,7 @@ def read(source: Any) -> tuple[mujoco.MjSpec, Path | None]:
 
 
 def add_watches(spec: mujoco.MjSpec, watch: Watches) -> None:
-    """One contact sensor a pair of geoms: whether they touch, and the least distance."""
+    """One contact sensor per pair of geoms: whether they touch, and the smallest distance."""
     geoms = {geom.name for geom in spec.geoms if geom.name}
     for name, pairs in watch.items():
         for i, pair in enumerate(pairs):
@@ -90,7 +92,7 @@ def add_watches(spec: mujoco.MjSpec, watch: Watches) -> None:
             sensor = spec.add_sensor(name=f"{PREFIX}{name}/{i}", type=mujoco.mjtSensor.mjSENS_CONTACT)
             sensor.objtype = sensor.reftype = mujoco.mjtObj.mjOBJ_GEOM
             sensor.objname, sensor.refname = pair
-            sensor.intprm[:3] = REPORT, 1, 1  # what it reports; the nearest; of one contact
+            sensor.intprm[:3] = REPORT, 1, 1  # reported values; the nearest; of one contact
 
 
 def add_power(spec: mujoco.MjSpec) -> None:
@@ -107,18 +109,18 @@ def add_power(spec: mujoco.MjSpec) -> None:
 
 @dataclass(frozen=True)
 class Watched:
-    """Where the sensor data of a model is its own, and where it is of watched contacts and actuators."""
+    """The layout of a model's sensor data: its own, watched contacts and actuators."""
 
-    own: int  # leading columns that are the model's own
+    own: int  # number of leading columns that are the model's own
     columns: tuple[int, ...]  # of each pair: found here, distance in the next
     group: tuple[int, ...]  # of each pair: the index of its watch
     names: tuple[str, ...]
-    forces: tuple[int, ...] = ()  # column of each actuator's force, where its work is wanted
+    forces: tuple[int, ...] = ()  # column of each actuator's force, if its work is requested
     velocities: tuple[int, ...] = ()  # and of its velocity
 
     @classmethod
     def of(cls, model: mujoco.MjModel, watch: Watches, work: bool = False) -> Watched:
-        """The layout of a model that `load` gave these watches."""
+        """The layout of a model that `load` compiled with these watches."""
         pairs = [(i, f"{PREFIX}{name}/{k}") for i, name in enumerate(watch) for k in range(len(watch[name]))]
         columns = tuple(int(model.sensor(name).adr[0]) for _, name in pairs)
         forces, velocities = (
@@ -129,17 +131,17 @@ class Watched:
         return cls(own, columns, tuple(i for i, _ in pairs), tuple(watch), forces, velocities)
 
     def power(self, sensordata: Any, xp: ModuleType) -> Any:
-        """[..., ns] -> [..., nu] W: what each actuator gives at the beginning of a step; 0 where it brakes.
+        """[..., ns] -> [..., nu] W: the power of each actuator at the beginning of a step; 0 while it brakes.
 
-        Of no columns where work is not wanted.
+        Without columns if work is not requested.
         """
         forces, velocities = (np.array(columns, int) for columns in (self.forces, self.velocities))
         return xp.maximum(sensordata[..., forces] * sensordata[..., velocities], 0.0)
 
     def depths(self, sensordata: Any, xp: ModuleType) -> Any:
-        """[..., ns] -> [..., W] m: greatest penetration of each watch's pairs; -inf where none touches.
+        """[..., ns] -> [..., W] m: largest penetration of each watch's pairs; -inf if none touches.
 
-        `xp` is NumPy or jax.numpy. A contact within a margin but apart is no touch.
+        `xp` is NumPy or jax.numpy. A contact within a margin but apart does not count as touching.
         """
         out = []
         for i in range(len(self.names)):

@@ -1,4 +1,4 @@
-"""MuJoCo's own batch on the CPU's threads: fast there, and bit for bit what a loop over `mj_step` gives."""
+"""MuJoCo's own batch on CPU threads: fast, and bit for bit the result of a loop over `mj_step`."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from jaxbiped.physics.fields import Fields
 from jaxbiped.physics.model import Watched, load
 from jaxbiped.physics.options import Common
 
-CHUNK = 2**22  # numbers that a chunk of steps may record: 32 MB
+CHUNK = 2**22  # most numbers recorded for a chunk of steps: 32 MB
 BROKEN = (WARNINGS.index("bad_qpos"), WARNINGS.index("bad_qvel"))
 STATE = mujoco.mjtState.mjSTATE_TIME | mujoco.mjtState.mjSTATE_QPOS | mujoco.mjtState.mjSTATE_QVEL
 
 
 class Options(Common):
-    """Of `physics.make("native", ...)`."""
+    """Options of `physics.make("native", ...)`."""
 
     device: Literal["cpu"] | None = None
     threads: pydantic.NonNegativeInt = 0
-    """Threads, this one included; 0: one a logical CPU. The results do not depend on it."""
+    """Threads, including this one; 0: one per logical CPU. The results do not depend on it."""
 
 
 class Native:
@@ -39,7 +39,7 @@ class Native:
     def __init__(self, model: Any, batch_size: int, options: Options):
         self.batch_size = inputs.size("batch_size", batch_size, most=inputs.MOST_SIMULATIONS)
         self.model = load(model, free_joint=options.free_joint, watch=options.watch, work=options.work)
-        # A simulation that blew up must stay so, not start anew from its default with status 0.
+        # A diverged simulation must stay so, and not restart from its default with status 0.
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         for name in options.fields:
             inputs.field_name(self.model, name)
@@ -47,7 +47,7 @@ class Native:
         self.watches = self.watched.names
         self.options = options
         self.living = Pool(self.model, self.batch_size, self.watched, options.threads)
-        self.scratch: Pool | None = None  # rollouts have a pool of their own: the living one goes on undisturbed
+        self.scratch: Pool | None = None  # rollouts have their own pool, so that the living one is not disturbed
 
     def rollout(
         self,
@@ -108,7 +108,7 @@ class Native:
 
 @contextlib.contextmanager
 def unprinted_warnings() -> Iterator[None]:
-    """Keep the engine from printing warnings and writing them to a file where the program runs: they are counted."""
+    """Keep the engine from printing warnings and writing them to a file in the working directory: they are counted."""
     handler = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: None)
     try:
@@ -124,7 +124,7 @@ class Pool:
         self.model, self.watched = model, watched
         self.batch = Batch(model, batch_size, threads)
         self.fields = Fields(self.batch)
-        # Bound before the first step: a field that is bound later reads zero until the next one.
+        # Bound before the first step: a field that is bound later reads zero until the next step.
         self.qpos, self.qvel, self.time = (self.batch.bind(name) for name in ("qpos", "qvel", "time"))
         self.sensordata = self.batch.bind("sensordata") if model.nsensordata else np.zeros((batch_size, 0))
         self.errors = np.zeros(batch_size, np.int32)
@@ -141,7 +141,7 @@ class Pool:
         return ~self.warnings.any(axis=1)
 
     def reset(self, mask: Bool[np.ndarray, "B"], qpos: Float64[np.ndarray, "B nq"], qvel: Float64[np.ndarray, "B nv"]):
-        """Set the state of some, with no warnings."""
+        """Set the state of some simulations, with no warnings."""
         ids = np.flatnonzero(mask)
         if len(ids):
             self.batch.reset(ids, stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -187,13 +187,13 @@ class Pool:
         return np.arange(1, steps // every + 1) * (every * model.opt.timestep), out, depth, work
 
     def no_work(self) -> Float64[np.ndarray, "B nw"]:
-        """None yet."""
+        """No work yet."""
         return np.zeros((len(self.qpos), len(self.watched.forces)))
 
     def chunk(
         self, ids: Integer[np.ndarray, "n"], controls: Float64[np.ndarray, "n S nu"]
     ) -> tuple[Float64[np.ndarray, "n S w"], Float64[np.ndarray, "n S ns"], Bool[np.ndarray, "n S"]]:
-        """Step some simulations; their states, sensors, and which of those records are valid."""
+        """Step some simulations; return their states, sensors, and which of those records are valid."""
         n, steps = controls.shape[:2]
         states = np.empty((n, steps, 1 + self.model.nq + self.model.nv))
         sensors = np.empty((n, steps, self.model.nsensordata))
@@ -208,7 +208,7 @@ class Pool:
         warned = ~self.valid[ids]
         for row in np.flatnonzero(warned):
             good[row, self.good_steps(states[row], before[row], bool(self.errors[ids[row]])) :] = False
-        # What breaks in the last step is found by the engine at the next, which may not come.
+        # The engine detects a failure in the last step only at the next step, which may not come.
         split = self.model.nq
         last = np.abs(states[:, -1, 1:]) < LIMIT
         broke = ~np.stack([last[:, :split].all(axis=1), last[:, split:].all(axis=1)], axis=1) & ~warned[:, None]
@@ -218,10 +218,10 @@ class Pool:
 
     @staticmethod
     def good_steps(states: Float64[np.ndarray, "S w"], before: float | np.floating, error: bool) -> int:
-        """How many steps of a simulation that was warned of are good.
+        """Number of good steps of a simulation with a warning.
 
         The engine stops at the first warning and repeats its last record; the step of the warning is bad too. An error
-        puts the state back to where the call began, and its records cannot be told apart.
+        resets the state to the beginning of the call, and its records cannot be told apart.
         """
         if error:
             return 0
@@ -232,7 +232,7 @@ class Pool:
         return int(min([max(went - 1, 0), *broken[:1]]))
 
     def state(self, depth: Float64[np.ndarray, "B W"], work: Float64[np.ndarray, "B nw"]) -> State:
-        """A copy of the state as it is."""
+        """A copy of the current state."""
         valid = self.valid
         blank = np.where(valid, 0.0, np.nan)[:, None]
         return State(

@@ -1,4 +1,4 @@
-"""What MJX refuses in a model, by name: the feature and the element that has it."""
+"""Features of a model that MJX does not support, by name: the feature and the element that has it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ IGNORED = {  # fields that change the motion in MuJoCo, and that MJX does not re
     "tendon": ("tendon_springyield",),
     "pair": ("pair_adhesion",),
 }
-TYPES = (  # fields whose values MJX knows only in part: of what, MuJoCo's names, MJX's
+TYPES = (  # fields whose values MJX supports only in part: element, MuJoCo's names, MJX's
     ("actuator", "trntype", mujoco.mjtTrn, mjx.TrnType),
     ("actuator", "dyntype", mujoco.mjtDyn, mjx.DynType),
     ("actuator", "gaintype", mujoco.mjtGain, mjx.GainType),
@@ -27,7 +27,7 @@ TYPES = (  # fields whose values MJX knows only in part: of what, MuJoCo's names
 
 
 def refusals(model: mujoco.MjModel) -> Iterator[str]:
-    """Each feature of a model that `mjx` cannot step, or would step otherwise than MuJoCo does; with its element."""
+    """Each feature of a model that `mjx` cannot step, or would step differently from MuJoCo; with its element."""
     yield from of_options(model)
     for kind, field, known, supported in TYPES:
         for i, value in enumerate(getattr(model, f"{kind}_{field}")):
@@ -49,7 +49,7 @@ def refusals(model: mujoco.MjModel) -> Iterator[str]:
 
 
 def of_options(model: mujoco.MjModel) -> Iterator[str]:
-    """What it refuses in the options of a model."""
+    """Unsupported features in the options of a model."""
     option = model.opt
     for field, known, supported in (
         ("integrator", mujoco.mjtIntegrator, mjx.IntegratorType),
@@ -68,7 +68,7 @@ def of_options(model: mujoco.MjModel) -> Iterator[str]:
     for i in range(model.nnumeric):
         numeric = model.numeric(i)
         if numeric.name == "max_geom_pairs":
-            yield "custom numeric 'max_geom_pairs': it would drop pairs of geoms unseen"
+            yield "custom numeric 'max_geom_pairs': it would silently drop pairs of geoms"
         if numeric.name == "max_contact_points" and model.numeric_adr[i] != i:
             yield "custom numerics of more than one number before 'max_contact_points'"
 

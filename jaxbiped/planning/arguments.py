@@ -1,4 +1,4 @@
-"""What the planning functions are given: checked, broadcast, and with one batch axis."""
+"""Arguments of the planning functions: checked, broadcast, and with one batch axis."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ CODES = ", ".join(f"{cell.value} {cell.name.lower()}" for cell in Cell)
 def grid_arguments(
     classes: Any, levels: Any, *parts: Any, arrays: dict[str, tuple[Any, str]] | None = None, **points: Any
 ) -> tuple[tuple[int, ...], tuple]:
-    """Class grids with their costs and rules and so on, and what else is given for each of them.
+    """Class grids with their costs, rules and further arguments.
 
     Args:
-      classes, levels: as of `planning.field`.
-      parts: dataclasses of numbers or of booleans, one an arena or one for all: `Costs`, `Rules`, `Times`.
-      arrays: further arrays that are checked, by their names, with their last axes as of `checks.leading_shape`.
-      points: further integer arrays by their names: `...ij` are cells [..., 2], others a direction an arena.
+      classes, levels: as for `planning.field`.
+      parts: dataclasses of numbers or of booleans, one per arena or one for all: `Costs`, `Rules`, `Times`.
+      arrays: further arrays to check, by name, with their last axes as in `checks.leading_shape`.
+      points: further integer arrays by name: `...ij` are cells [..., 2], others one direction per arena.
 
     Returns:
       The batch shape, and (classes, levels, *parts, *arrays, *points), all with one leading axis: classes and levels
-      int8 [N, H, W], where a cell that is not valid in a traced grid is a class of its own (`INVALID`); float32, bool
-      or int32 [N].
+      int8 [N, H, W], where an invalid cell of a traced grid has a class of its own (`INVALID`); float32, bool or int32
+      [N].
 
     Raises:
       InputError: a rank, shape, dtype, class code or level that is not allowed.
@@ -52,13 +52,13 @@ def grid_arguments(
     return batch, (fold(classes, batch, 2), fold(levels, batch, 2), *folded_parts, *folded)
 
 
-INVALID = 5  # the class of cells that no map may have: nothing passes, and a field of such a map does not converge
+INVALID = 5  # the class of invalid cells: impassable, and a field of such a map does not converge
 
 
 def class_grids(classes: Any, levels: Any) -> tuple[np.ndarray | jax.Array, np.ndarray | jax.Array]:
     """Classes and levels as int8.
 
-    The level of a cell that is an obstacle or unmeasured is not read, so it may be anything.
+    The level of an obstacle or an unmeasured cell is not read, so it may be anything.
 
     Raises:
       InputError: not integers, or too few axes; for concrete grids also a class that is not a `Cell`, or a level
@@ -95,7 +95,7 @@ def are_classes(classes: jax.Array) -> jax.Array:
 def checked_fields(part: Any):
     """A dataclass of numbers or booleans with its leaves checked: float32 or bool arrays.
 
-    Which of both they are is told by the defaults of its class.
+    The defaults of its class tell which of the two they are.
     """
     name, default = type(part).__name__.lower(), type(part)()
 

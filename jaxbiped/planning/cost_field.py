@@ -1,4 +1,4 @@
-"""Cost-to-go fields rooted at the goal: `cost_to_go` on given edge costs, `field` straight from a class grid."""
+"""Cost-to-go fields rooted at the goal: `cost_to_go` from given edge costs, `field` directly from a class grid."""
 
 from __future__ import annotations
 
@@ -27,34 +27,34 @@ from jaxbiped.planning.costs import Costs, Rules, half_edges, tables
 
 keep_programs()
 METHODS = ("wavefront", *kernels.METHODS)
-CHUNK = kernels.LANES  # arenas settled together: what fits the cache
-PIECES = 4  # for each core, so that a slow piece does not leave the other cores idle
-LARGE, FEW = 1200, 4  # cells of a large grid; fewer of these at once are settled one by one,
-HUGE = 1 << 17  # as grids of more cells than that are, however many there are
+CHUNK = kernels.LANES  # arenas solved together: as many as fit in the cache
+PIECES = 4  # pieces per core, so that a slow piece does not leave the other cores idle
+LARGE, FEW = 1200, 4  # cells of a large grid; fewer of these at once are solved one by one,
+HUGE = 1 << 17  # like grids of more cells than this, in any number
 NO_GRADIENT = "a field has no gradient: differentiate `planning.path_cost`, the cost of the best path from a start"
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class CostToGo:
-    """Least cost from each cell to the goal."""
+    """Lowest cost from each cell to the goal."""
 
-    cost: Float[Array, "*B H W"]  # inf: no way, or not converged
+    cost: Float[Array, "*B H W"]  # inf: no path, or not converged
     iterations: Int[Array, "*B"]  # rounds of relaxation until nothing changed; 1 with "dijkstra"
-    converged: Bool[Array, "*B"]  # whether the costs are exact: one more relaxation, which was made, lowers none
+    converged: Bool[Array, "*B"]  # whether the costs are exact: one more relaxation, which is done, lowers none
 
 
 def cost_to_go(edge_costs: Any, goal_ij: Any, method: str = "auto") -> CostToGo:
-    """Least cost from each cell to `goal_ij` over `edge_costs` (what leaving a cell in each direction costs).
+    """Lowest cost from each cell to `goal_ij` over `edge_costs` (the cost of leaving a cell in each direction).
 
     Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`. There is no gradient (see `path_cost`).
 
     Args:
-      edge_costs: [*B, 8, H, W], float32; zero and inf are allowed. An arena with a NaN or a negative one does not
-        converge, and its costs are inf. Moves out of the grid are not made, whatever they cost.
-      goal_ij: [*B, 2], integers, row and column; a goal outside the grid is reached from nowhere.
-      method: "wavefront" (any device), "line_sweep" or "dijkstra" (CPU), or "auto": line sweeps on a CPU, Dijkstra
-        there for huge grids and for few large ones, the wavefront elsewhere.
+      edge_costs: [*B, 8, H, W], float32; zero and inf are allowed. An arena with a NaN or a negative cost does not
+        converge, and its costs are inf. Moves out of the grid are never made, whatever their cost.
+      goal_ij: [*B, 2], integers, row and column; a goal outside the grid cannot be reached.
+      method: "wavefront" (any device), "line_sweep" or "dijkstra" (CPU), or "auto": line sweeps on a CPU, but Dijkstra
+        for huge grids and for few large ones, and the wavefront on other devices.
 
     Raises:
       InputError: an argument of another rank, shape or dtype; a method that this device does not have.
@@ -74,24 +74,24 @@ def field(
     method: str = "auto",
     devices: Sequence[jax.Device] | None = None,
 ) -> CostToGo:
-    """`cost_to_go` of `edge_costs`, without ever holding all edge costs: the fast path.
+    """`cost_to_go` of `edge_costs` without holding all edge costs at once: the fast path.
 
-    Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`, where its chunks run one after the other;
-    called from outside on a CPU they go to all cores. An arena's result does not depend on the others of its batch.
+    Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`, where its chunks run one after another;
+    called from outside on a CPU it uses all cores. An arena's result does not depend on the others of its batch.
     There is no gradient (see `path_cost`).
 
     Args:
-      classes: [*B, H, W], integers, a `Cell` each. Traced grids with another value do not converge: their costs are
+      classes: [*B, H, W], integers, one `Cell` each. Traced grids with another value do not converge: their costs are
         inf.
-      levels: [*B, H, W], integers, height of each cell's ground in steps, from -128 to 127; not read where a cell is
-        unmeasured or an obstacle. Traced grids with a level beyond that do not converge.
+      levels: [*B, H, W], integers, height of each cell's ground in steps, from -128 to 127; not read for unmeasured
+        cells and obstacles. Traced grids with a level out of range do not converge.
       costs, rules: leaves [*B]; the paper's by default. An arena with a cost that is NaN or negative does not converge.
-      goal_ij: [*B, 2], integers, row and column; a goal outside the grid is reached from nowhere.
-      method: as of `cost_to_go`.
-      devices: called from outside, they share the batch; by default all of this process where they are no CPU.
+      goal_ij: [*B, 2], integers, row and column; a goal outside the grid cannot be reached.
+      method: as for `cost_to_go`.
+      devices: called from outside, they share the batch; by default all of this process unless they are CPUs.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known; a
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete; a
         method that this device does not have.
     """
     if goal_ij is None:
@@ -104,7 +104,7 @@ def field(
 
 @cache
 def _differentiated(solve, method: str):
-    """`solve(inputs, method)` as a function of `inputs` that `vmap` and `grad` know what to do with."""
+    """`solve(inputs, method)` as a function of `inputs` that supports `vmap` and `grad`."""
     return without_gradient(folding_vmap(lambda inputs: solve(inputs, method)), NO_GRADIENT)
 
 
@@ -134,7 +134,7 @@ def _field(inputs, method: str) -> CostToGo:
 
 
 def _from_grids(classes, levels, each, goal_ij) -> CostToGo:
-    """Line sweeps, for which the kernel itself prices the edges of a few arenas at a time."""
+    """Line sweeps, where the kernel itself computes edge costs for a few arenas at a time."""
     read, valid = _tables(each)
     valid &= are_classes(classes)
     goal_ij = jnp.where(valid[:, None], goal_ij, -1)
@@ -151,7 +151,7 @@ def _tables(each):
 
 
 def _checked(costs: Costs):
-    """The costs, where they are valid, else inf; and whether they are."""
+    """The costs if they are valid, else inf; and whether they are."""
     valid = jnp.stack([c >= 0 for c in jax.tree.leaves(costs)]).all(0)  # False for NaN as well
     return jax.tree.map(lambda c: jnp.where(valid, c, jnp.inf), costs), valid
 
@@ -174,7 +174,7 @@ def _method(name: str, grids) -> str:
 
 
 def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
-    """`solve` on pieces of the batch: on devices, or from as many threads as a CPU has cores, if that is any use."""
+    """`solve` on pieces of the batch: on devices, or in as many threads as a CPU has cores, if that helps."""
     batch, grid = inputs[0].shape[0], inputs[0].shape[-2:]
     if batch * math.prod(grid) == 0:
         return CostToGo(jnp.zeros((batch, *grid)), jnp.zeros(batch, jnp.int32), jnp.ones(batch, bool))
@@ -194,7 +194,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
 
     def piece(start):
         stop = min(start + size, batch)
-        rows = slice(stop - size, stop)  # the last one overlaps the one before: one program
+        rows = slice(stop - size, stop)  # the last piece overlaps the one before: one program
         part = jax.tree.map(lambda a: a[rows], inputs)
         if direct:
             kernels.solve_arrays(*part, out.cost[rows], out.iterations[rows], out.converged[rows])
@@ -204,11 +204,11 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
     with ThreadPoolExecutor(cores()) as pool:
         list(pool.map(piece, range(0, batch, size)))
     out.converged[:] &= valid
-    return jax.device_put(out)  # which takes arrays over as they are, where `jnp.asarray` copies
+    return jax.device_put(out)  # adopts arrays without a copy, unlike `jnp.asarray`
 
 
 def _prepared(inputs):
-    """Arguments of `kernels.solve_arrays`, all but its results; and which arenas are valid."""
+    """Arguments of `kernels.solve_arrays`, except its results; and which arenas are valid."""
     classes, levels, each, goal_ij = inputs
     read, valid = _tables(each)
     valid = np.asarray(valid)
@@ -218,9 +218,9 @@ def _prepared(inputs):
 
 
 def _solve(edges, goal_ij, method: str, valid) -> CostToGo:
-    # Sums along a path drift by up to half a unit in the last place a move: as float32, a path of a thousand moves is
-    # off by more than 1e-5. So sums are float64, in any program.
-    goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing is reached
+    # Sums along a path drift by up to half a unit in the last place per move: as float32, a path of 1000 moves has
+    # an error above 1e-5. So sums are float64, in any program.
+    goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing can be reached
     with jax.enable_x64(True):
         if method == "wavefront":
             cost, steps, settled = wavefront.solve_edges(edges, goal_ij)
@@ -230,7 +230,7 @@ def _solve(edges, goal_ij, method: str, valid) -> CostToGo:
 
 
 def _by_chunks(solve, inputs) -> CostToGo:
-    """`solve(*inputs)` in chunks of the leading axis, one after the other."""
+    """`solve(*inputs)` in chunks of the leading axis, one after another."""
     batch = inputs[0].shape[0]
     if batch <= CHUNK:
         return solve(*inputs)

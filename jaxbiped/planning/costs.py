@@ -1,4 +1,4 @@
-"""The graph of the 2D grid map: eight directions, and what a move in each of them costs (paper, Eq. 1)."""
+"""The graph of the 2D grid map: eight directions, and the cost of a move in each of them (paper, Eq. 1)."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from jaxbiped.core.batching import unfold
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.arguments import grid_arguments
 
-# (di, dj) of the eight moves; row i is along y and column j along x, so that direction k heads for k * 45 deg
+# (di, dj) of the eight moves; row i is along y and column j along x, so direction k points to k * 45 deg
 DIRECTIONS = np.array([(0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1), (-1, 0), (-1, 1)])
-BASE_PITCH = 0.05  # [m] the pitch that the paper's costs are given for (paper, 3)
+BASE_PITCH = 0.05  # [m] the pitch for which the paper gives its costs (paper, 3)
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Costs:
-    """C0 to C4 of the paper's Eq. 1 on its 5 cm pitch; scalars, or one a arena. All traced, none negative."""
+    """C0 to C4 of the paper's Eq. 1 on its 5 cm pitch; scalars, or one per arena. All traced, none negative."""
 
     c0: Float[Array, "*B"] | float = 1.0  # distance: a straight move; a diagonal one costs sqrt(2) c0
     c1: Float[Array, "*B"] | float = 1.0  # motion: on one level
@@ -34,9 +34,9 @@ class Costs:
         """The same costs on a grid of another `pitch` [m].
 
         Costs are per metre or per event, never per cell. C0 (distance), C1 (level walking), C2 (squatting
-        along under a gate) and C4 (measuring on the way) are paid along the way: they scale with
+        along under a gate) and C4 (measuring on the way) are incurred along the path: they scale with
         pitch / 0.05 m. C3 is an event (one step over an edge takes 96 s on any grid, Table 2): it does not
-        scale. So the same way on two grids costs the same but for the one cell at which it crosses an edge.
+        scale. So the same path on two grids costs the same, except for the one cell at which it crosses an edge.
         """
         scale = pitch / BASE_PITCH
         return Costs(self.c0 * scale, self.c1 * scale, self.c2 * scale, self.c3, self.c4 * scale)
@@ -45,21 +45,21 @@ class Costs:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Rules:
-    """What the robot may do; scalars, or one a arena. All traced."""
+    """What the robot may do; scalars, or one per arena. All traced."""
 
     corner_cutting: Bool[Array, "*B"] | bool = False  # diagonal moves past one blocked orthogonal neighbour
     bumps: Bool[Array, "*B"] | bool = True  # step up and down; else bump cells are obstacles
     gates: Bool[Array, "*B"] | bool = True  # squat through; else gate cells are obstacles
 
 
-# what a move is, worst last: the precedence of the paper's 2.3 is a plain maximum over ends and rise
+# kinds of moves, worst last: the precedence of the paper's 2.3 is a plain maximum over ends and rise
 LEVEL, IN_GATE, STEP, UNMEASURED, FORBIDDEN = range(5)
 
 
 def cell_kinds(classes: Int[Array, "*S"], rules: Rules) -> Int8[Array, "*S"]:
-    """What a cell makes of the moves that touch it; the leaves of `rules` broadcast from the right.
+    """The kind of the moves that touch a cell, as far as the cell decides; leaves of `rules` broadcast from the right.
 
-    What is no class is an obstacle.
+    An invalid class counts as an obstacle.
     """
     bump = (classes == Cell.BUMP) & ~jnp.asarray(rules.bumps)
     gate = classes == Cell.GATE
@@ -70,7 +70,7 @@ def cell_kinds(classes: Int[Array, "*S"], rules: Rules) -> Int8[Array, "*S"]:
 
 
 def move_kind(here, there, sides, corner_cutting) -> Int8[Array, "*S"]:
-    """What a move is. `here`, `there`: (kind, level) of its ends; `sides`: the kinds of the two orthogonal
+    """The kind of a move. `here`, `there`: (kind, level) of its ends; `sides`: the kinds of the two orthogonal
     neighbours of a diagonal move, None for a straight one."""
     (kind_a, level_a), (kind_b, level_b) = here, there
     rise = jnp.abs(level_a.astype(jnp.int16) - level_b.astype(jnp.int16))
@@ -84,7 +84,7 @@ def move_kind(here, there, sides, corner_cutting) -> Int8[Array, "*S"]:
 
 
 def kind_cost(kind: Int8[Array, "*S"], costs: Costs, diagonal: bool) -> Float[Array, "*S"]:
-    """C_distance + C_motion of a move (paper, Eq. 1); inf where it is forbidden."""
+    """C_distance + C_motion of a move (paper, Eq. 1); inf if it is forbidden."""
     c0, c1, c2, c3, c4 = (jnp.asarray(c, jnp.float32) for c in (costs.c0, costs.c1, costs.c2, costs.c3, costs.c4))
     distance = c0 * np.float32(np.sqrt(2)) if diagonal else c0
     out = jnp.where(kind == FORBIDDEN, jnp.inf, distance + c4)
@@ -109,7 +109,7 @@ def half_edges(
 ) -> tuple[Float[Array, "H2 W2 B"], ...]:
     """Costs of the first four directions, batch last, with a ring of inf (H2 = H + 2, W2 = W + 2).
 
-    A move costs what the move back costs, so that these four are all.
+    A move costs the same in both directions, so these four are all.
     """
     height, width, _ = classes.shape
     ring = ((1, 2), (2, 2), (0, 0))
@@ -131,21 +131,21 @@ def half_edges(
 def edge_costs(
     classes: Any, levels: Any, costs: Costs | None = None, rules: Rules | None = None
 ) -> Float[Array, "*B 8 H W"]:
-    """Cost of leaving each cell in each of `DIRECTIONS`, inf where that is forbidden (paper, Eq. 1 and 2.3).
+    """Cost of leaving each cell in each of `DIRECTIONS`, inf where it is forbidden (paper, Eq. 1 and 2.3).
 
     Leading axes broadcast. May be called inside `jit`, `vmap` and `grad`.
 
     Args:
-      classes: [*B, H, W], integers, a `mapping.grid.Cell` each; any other value in a traced grid is an obstacle.
+      classes: [*B, H, W], integers, one `mapping.grid.Cell` each; any other value in a traced grid is an obstacle.
       levels: [*B, H, W], integers, height of each cell's ground in steps, from -128 to 127; ends more than one step
-        apart are not joined. That of an unmeasured cell is not known, and not read. In a traced grid a cell with a
-        level beyond that is an obstacle.
+        apart are not joined. The level of an unmeasured cell is not known, and not read. In a traced grid a cell with a
+        level out of range is an obstacle.
       costs, rules: leaves [*B]; the paper's by default.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete.
 
-    Deviation: the paper says nothing of diagonal moves past the corner of an obstacle; `Rules.corner_cutting`.
+    Deviation: the paper does not mention diagonal moves past the corner of an obstacle; see `Rules.corner_cutting`.
     """
     batch, inputs = grid_arguments(classes, levels, costs or Costs(), rules or Rules())
     return unfold(_edge_costs(*inputs), batch)

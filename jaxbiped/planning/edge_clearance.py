@@ -1,4 +1,4 @@
-"""What it costs to walk along an edge of the ground: feet are wider than the line that a plan is made of."""
+"""The cost of walking along an edge of the ground: feet are wider than the line of a plan."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from jaxtyping import Array, Float, Int
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import BASE_PITCH, DIRECTIONS
 
-# [m] from the line of a move to the centre of a cell beside it, and what a move of 5 cm costs more when it is higher:
-# within the first the feet would tread on it, within the second they might: an edge lies anywhere in its cell
+# [m] from the line of a move to the centre of a cell beside it, and the extra cost of a 5 cm move if it is higher:
+# within the first the feet would step on it, within the second they might: an edge may be anywhere in its cell
 HIGHER = ((0.075, 8.0), (0.11, 5.0))
-LOWER = ((0.06, 8.0), (0.11, 3.0))  # the same when it is lower: an ankle beyond the edge has no hold
-TOES = 0.05  # [m] that a foot reaches beyond both ends of a move
-# the same beside a move over an edge, for each cell there whose ground is not as at the move's ends
+LOWER = ((0.06, 8.0), (0.11, 3.0))  # the same if it is lower: an ankle beyond the edge has no support
+TOES = 0.05  # [m] reach of a foot beyond both ends of a move
+# the same beside a move over an edge, for each cell whose ground differs from that at the move's ends
 RAGGED = ((0.06, 3.0), (0.11, 1.0))
 LEAST = 1e-3  # [m]
-NOWHERE = -99  # level of what cannot be trodden on
+NOWHERE = -99  # level of cells that cannot be stepped on
 
 
 def rim_costs(classes: Int[Array, "B H W"], levels: Int[Array, "B H W"], pitch: float) -> Float[Array, "B 8 H W"]:
-    """What is to be added to `edge_costs` for a robot whose feet stand 15 cm wide: it keeps off edges beside it.
+    """Surcharge on `edge_costs` for a robot whose feet stand 15 cm wide: it keeps away from edges beside it.
 
-    A move on one level costs more when ground on another level lies beside it, or obliquely before its toes or behind
-    its heels. An edge right ahead does not count: it is crossed, square to it. A move over an edge costs more where the
-    edge is not straight, as at a corner, since both feet need ground beyond it. A move costs what the move back costs.
-    Deviation: the robot of the paper's plan has no feet.
+    A move on one level costs more if ground on another level lies beside it, or diagonally before its toes or behind
+    its heels. An edge straight ahead does not count: it is crossed perpendicularly. A move over an edge costs more
+    where the edge is not straight, as at a corner, since both feet need ground beyond it. A move costs the same in both
+    directions. Deviation: the robot of the paper's plan has no feet.
 
     Args:
       pitch: static [m].
@@ -51,7 +51,7 @@ def rim_costs(classes: Int[Array, "B H W"], levels: Int[Array, "B H W"], pitch: 
         length = math.hypot(di, dj)
         there, known = at(di, dj), ground & (at(di, dj) != NOWHERE)
         level_walk, over = known & (there == level), known & (there != level)
-        into = at(2 * di, 2 * dj), at(-di, -dj)  # the cells right ahead and right behind
+        into = at(2 * di, 2 * dj), at(-di, -dj)  # the cells straight ahead and straight behind
         surcharge, ragged = jnp.zeros(classes.shape), jnp.zeros(classes.shape)
         for oi, oj in np.ndindex(2 * reach + 1, 2 * reach + 1):
             oi, oj = oi - reach, oj - reach

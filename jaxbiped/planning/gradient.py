@@ -19,13 +19,13 @@ from jaxbiped.planning.costs import FORBIDDEN, IN_GATE, LEVEL, STEP, UNMEASURED,
 from jaxbiped.planning.path import Path, path_arguments, read_path
 
 KIND = Costs(c0=0.0, c1=float(LEVEL), c2=float(IN_GATE), c3=float(STEP), c4=float(UNMEASURED))
-"""Under these costs a move costs what it is."""
+"""Under these costs the cost of a move is its kind."""
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class MoveCounts:
-    """The moves of a path, by their shape and again by their kind. A path that is not valid has none."""
+    """The moves of a path, counted by shape and by kind. An invalid path has none."""
 
     straight: Int[Array, "*B"]
     diagonal: Int[Array, "*B"]
@@ -36,7 +36,7 @@ class MoveCounts:
     valid: Bool[Array, "*B"]
 
     def per_cost(self) -> Costs:
-        """How often each cost is paid: the gradient of the path's cost (paper, Eq. 1). Leaves [B], float32."""
+        """How often each cost is incurred: the gradient of the path's cost (paper, Eq. 1). Leaves [B], float32."""
         single = jax.tree.map(lambda n: n.astype(jnp.float32), replace(self, valid=None))
         return Costs(
             single.straight + math.sqrt(2.0) * single.diagonal,
@@ -48,14 +48,14 @@ class MoveCounts:
 
 
 def move_counts(path: Path, classes: Any, levels: Any, rules: Rules | None = None) -> MoveCounts:
-    """What the moves of paths over class grids are. Leading axes broadcast, those of `path` with them.
+    """Count the kinds of moves of paths over class grids. Leading axes broadcast, including those of `path`.
 
     Args:
-      path: as read on these grids.
-      classes, levels, rules: as of `field`.
+      path: paths read on these grids.
+      classes, levels, rules: as for `field`.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete.
     """
     batch, inputs = grid_arguments(classes, levels, rules or Rules(), arrays=path_arguments(path))
     return unfold(_move_counts(*inputs), batch)
@@ -86,28 +86,28 @@ def path_cost(
     heading: Any = None,
     max_length: int | None = None,
 ) -> Float[Array, "*B"]:
-    """The cost of the best path of each arena (paper, Eq. 1), which `jax.grad` takes by the costs.
+    """The cost of the best path of each arena (paper, Eq. 1), which `jax.grad` differentiates by the costs.
 
-    The cost of one path is linear in C0 to C4, and counts how often each is paid. The least over all paths is
-    therefore concave and piecewise linear in them, and where one path is the best, its counts are the gradient
-    (the envelope theorem). They are read off that path; the relaxation that found it is not unrolled. Where several
-    paths are equally good there is a kink; the counts are then those of the path that `path.pick`'s rule for ties
-    takes, which is a supergradient: f(c') <= f(c) + counts . (c' - c) for all c', up to `path.TIE` of f(c).
+    The cost of one path is linear in C0 to C4, with coefficients that count how often each is incurred. The minimum
+    over all paths is therefore concave and piecewise linear in them, and where one path is the best, its counts are the
+    gradient (the envelope theorem). They are read from that path; the relaxation that found it is not unrolled. Where
+    several paths are equally good there is a kink; the counts are then those of the path chosen by the tie rule of
+    `path.pick`, which is a supergradient: f(c') <= f(c) + counts . (c' - c) for all c', up to `path.TIE` of f(c).
 
-    By everything else the gradient is zero. There is no forward mode, and C0 must be positive: moves that cost nothing
-    may be left out of the counts. Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`.
+    The gradient with respect to everything else is zero. There is no forward mode, and C0 must be positive: moves that
+    cost nothing may be missing in the counts. Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`.
 
     Args:
       costs: leaves [*B].
-      classes, levels, rules, goal_ij: as of `field`.
-      start_ij, heading: as of `read_path`.
+      classes, levels, rules, goal_ij: as for `field`.
+      start_ij, heading: as for `read_path`.
       max_length: static; longer paths count as none. By default no path is too long.
 
     Returns:
-      inf where there is no way; the gradient there is zero.
+      inf if there is no path; the gradient there is zero.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete.
     """
     points = {"start_ij": start_ij, "goal_ij": goal_ij, "heading": -1 if heading is None else heading}
     batch, (classes, levels, rules, each, *ends) = grid_arguments(classes, levels, rules or Rules(), costs, **points)
@@ -118,12 +118,12 @@ def path_cost(
 
 @partial(jax.custom_vjp, nondiff_argnums=(2,))
 def least(costs: Costs, fixed, length: int) -> Float[Array, "B"]:
-    """`path_cost` with [B] costs, and all that it is not differentiated by in one tuple."""
+    """`path_cost` with [B] costs, and all arguments that are not differentiated in one tuple."""
     return solve(costs, fixed, length).cost
 
 
 def solve(costs: Costs, fixed, length: int) -> Path:
-    """The best path; its cost is inf where it is not valid."""
+    """The best path; its cost is inf if it is not valid."""
     classes, levels, rules, start_ij, goal_ij, heading = fixed
     to_go = field(classes, levels, costs, rules, goal_ij)
     path = read_path(to_go, edge_costs(classes, levels, costs, rules), start_ij, length, heading)

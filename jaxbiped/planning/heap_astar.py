@@ -15,23 +15,23 @@ from jaxbiped.planning.path import TIE
 
 
 class AStarPath(NamedTuple):
-    """Cells from start to goal and their cost; no cells and inf where there is no way."""
+    """Cells from start to goal and their cost; no cells and inf if there is no path."""
 
     cells_ij: Int[np.ndarray, "L 2"]
     cost: float
 
 
 def astar(edge_costs: Any, start_ij: Any, goal_ij: Any, heading: int = -1) -> AStarPath:
-    """Least path on the edge costs of one arena, in plain Python.
+    """Lowest-cost path on the edge costs of one arena, in plain Python.
 
-    It searches from the goal towards the start, so that what it settles is the cost to go, and goes on until
-    all cells of equally good paths are settled; the path is then read with the tie rule of `path.pick`:
-    the present heading (`heading` before the first move) if it is among the best, else the first in the
-    order of `DIRECTIONS`. The heuristic is the octile distance at the least cost of a straight and of an
-    diagonal move; it never overrates, since two moves of one kind may do the work of the other.
+    It searches from the goal towards the start, so that it computes the cost to go, and continues until all cells of
+    equally good paths are settled; the path is then read with the tie rule of `path.pick`: the present heading
+    (`heading` before the first move) if it is among the best, else the first in the order of `DIRECTIONS`. The
+    heuristic is the octile distance at the lowest cost of a straight and of a diagonal move; it never overestimates,
+    since two moves of one kind may replace one of the other.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, a cost that is negative or NaN, or no direction.
+      InputError: an argument of another rank, shape or dtype, a cost that is negative or NaN, or an invalid direction.
     """
     edges = as_array("edge_costs", edge_costs)
     start, goal = cells("start_ij", start_ij), cells("goal_ij", goal_ij)
@@ -41,7 +41,7 @@ def astar(edge_costs: Any, start_ij: Any, goal_ij: Any, heading: int = -1) -> AS
     if heading > 7:
         raise InputError("must be a direction from 0 to 7, or -1 for none", field="heading", value=heading)
     edges = np.asarray(edges, np.float64)
-    if not (edges >= 0).all():  # nor NaN
+    if not (edges >= 0).all():  # also false for NaN
         raise InputError("must be 0 or more", field="edge_costs", value=float(edges[~(edges >= 0)][0]))
     height, width = edges.shape[1:]
     start, goal = tuple(start.tolist()), tuple(goal.tolist())
@@ -78,7 +78,7 @@ def astar(edge_costs: Any, start_ij: Any, goal_ij: Any, heading: int = -1) -> AS
         ahead = {}
         for k, (di, dj) in enumerate(DIRECTIONS):
             there = (i + int(di), j + int(dj))
-            # on a plateau only to what was settled before: moves that cost nothing must not lead in circles
+            # on a plateau only to cells settled before: moves that cost nothing must not lead in circles
             if there in settled and (cost[there], settled[there]) < (cost[i, j], settled[i, j]):
                 ahead[k] = edges[k, i, j] + cost[there]
         best = min(ahead.values())

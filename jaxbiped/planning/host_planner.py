@@ -1,4 +1,4 @@
-"""Planners that are plain functions of NumPy arrays for one map, as libraries have them that know nothing of JAX."""
+"""Planners that are plain functions of NumPy arrays for one map, such as libraries that do not use JAX."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ MapPlanner = Callable[[np.ndarray, np.ndarray, tuple[int, int], tuple[int, int],
 class HostPlanner(Planner):
     """A function that plans on one map, called on the host from inside the compiled loop.
 
-    As a pytree it is a number in the list of all functions: missions of different functions share one program.
+    As a pytree it is an index into the list of all functions: missions of different functions share one program.
 
     `function(classes, levels, start_ij, goal_ij, costs) -> cells`:
 
-    - `classes` int8 [H, W]: `jaxbiped.Cell` of each cell. What the strategy does not dare is an obstacle already.
-    - `levels` int8 [H, W]: of the ground; between neighbours that differ by more than one there is no way.
+    - `classes` int8 [H, W]: `jaxbiped.Cell` of each cell. Cells that the strategy must not cross are already obstacles.
+    - `levels` int8 [H, W]: of the ground; neighbours that differ by more than one are not connected.
     - `start_ij`, `goal_ij`: row and column.
     - `costs`: `Costs` of Eq. 1 on this pitch, plain floats.
-    - `cells`: integers [L, 2] from the start to the goal, each a neighbour of the one before, or None where there is no
-      way. A diagonal move must not pass a blocked cell, unless `corner_cutting` allows it.
+    - `cells`: integers [L, 2] from the start to the goal, each a neighbour of the one before, or None if there is no
+      path. A diagonal move must not pass a blocked cell, unless `corner_cutting` allows it.
 
     A function that raises an error, or returns anything else, ends its mission as `planner_failed`, and the first such
-    error of a process is told on stderr; one that takes longer than `limit` ends it as `planner_timeout`. Python code
-    is interrupted then; a library's compiled code is first let return.
+    error of a process is reported on stderr; one that takes longer than `limit` ends it as `planner_timeout`. Python
+    code is then interrupted; a library's compiled code must return first.
     """
 
     function: MapPlanner = field(metadata={"static": True})
@@ -70,19 +70,19 @@ class HostPlanner(Planner):
         object.__setattr__(self, "number", np.int32(number_of(self.function, self.limit)))
 
     def tree_flatten(self):
-        """Its number."""
+        """Its index."""
         return (self.number,), None
 
     @classmethod
     def tree_unflatten(cls, _, leaves):
-        """Of the same number, perhaps traced or of a batch."""
+        """From the same index, perhaps traced or of a batch."""
         made = object.__new__(cls)
         for name, value in (("function", None), ("limit", None), ("number", leaves[0])):
             object.__setattr__(made, name, value)
         return made
 
     def __reduce__(self):
-        """With the functions themselves: their numbers are those of one process."""
+        """Pickle the functions themselves, since their indices belong to one process."""
         if self.function is not None:
             return type(self), (self.function, self.limit)
         known, places = np.unique(np.asarray(self.number), return_inverse=True)
@@ -112,23 +112,23 @@ class HostPlanner(Planner):
 
 
 def reals_like(count: int) -> jax.Array:
-    """What numbers of a batch are broadcast to."""
+    """The shape to which numbers of a batch are broadcast."""
     return jnp.zeros(count, jnp.float32)
 
 
 def numbered(functions: list[tuple[MapPlanner, float]], places: np.ndarray) -> HostPlanner:
-    """A batch of planners: which of some functions, with their limits, each of them is."""
+    """A batch of planners: the index of each into some functions with their limits."""
     numbers = np.array([number_of(*function) for function in functions], np.int32)
     return HostPlanner.tree_unflatten(None, (numbers[places],))
 
 
 KNOWN: dict[tuple[MapPlanner, float], int] = {}
-FUNCTIONS: list[tuple[MapPlanner, float]] = []  # with their limits, by their numbers
+FUNCTIONS: list[tuple[MapPlanner, float]] = []  # functions with their limits, by index
 LOCK = threading.Lock()
 
 
 def number_of(function: MapPlanner, limit: float) -> int:
-    """Its place in the list of this process."""
+    """Its index in the list of this process."""
     with LOCK:
         known = KNOWN.setdefault((function, limit), len(FUNCTIONS))
         if known == len(FUNCTIONS):
@@ -137,7 +137,7 @@ def number_of(function: MapPlanner, limit: float) -> int:
 
 
 def answer(classes, levels, start, goal, costs, rules, active, numbers):
-    """The routes of a batch, each by the function of its number: moves, costs, seconds and faults."""
+    """The routes of a batch, each by the function of its index: moves, costs, seconds and faults."""
     count, length = len(start), 3 * sum(classes.shape[1:])
     moves = np.full((count, length), -1, np.int8)
     cost, seconds = np.full(count, np.nan, np.float32), np.zeros(count, np.float32)
@@ -154,20 +154,20 @@ def answer(classes, levels, start, goal, costs, rules, active, numbers):
             try:
                 found, cost[k] = read_way(way, grid, levels[k], start[k], goal[k], own, cutting)
                 moves[k, : min(length, len(found))] = found[:length]
-            except Exception as error:  # also of what it returned, when that is made an array
+            except Exception as error:  # also from converting its result to an array
                 fault[k] = FAILED
                 tell(function, str(error))
     return moves, cost, seconds, fault
 
 
 def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs: Costs) -> tuple[int, Any]:
-    """The fault of one call, and what it returned."""
+    """The fault of one call, and the value returned."""
     start, goal = (tuple(int(v) for v in cell) for cell in (start, goal))
     try:
         return FINE, within(limit, function, classes, levels, start, goal, costs)
     except TimeLimit:
         return TOO_SLOW, None
-    except KeyboardInterrupt:  # of the person, not of the function
+    except KeyboardInterrupt:  # from the user, not from the function
         _thread.interrupt_main()
         return FAILED, None
     except BaseException as error:
@@ -177,7 +177,7 @@ def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs
 
 
 def dared(classes: np.ndarray, bumps: bool, gates: bool) -> np.ndarray:
-    """A copy of a map on which what is not dared is an obstacle."""
+    """A copy of a map on which cells that must not be crossed are obstacles."""
     grid = classes.copy()
     if not bumps:
         grid[grid == Cell.BUMP] = Cell.OBSTACLE
@@ -187,23 +187,23 @@ def dared(classes: np.ndarray, bumps: bool, gates: bool) -> np.ndarray:
 
 
 def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> tuple[np.ndarray, float]:
-    """The moves of a way, and what it costs by Eq. 1.
+    """The moves of a path, and its cost by Eq. 1.
 
     Raises:
-      ValueError: what is wrong with it.
+      ValueError: what is wrong with the path.
     """
     cells = np.asarray(way)
     if cells.ndim != 2 or cells.shape[1] != 2 or len(cells) == 0 or cells.dtype.kind not in "iuf":
         raise ValueError(f"must return cells [L, 2] or None, not {cells.dtype} {list(cells.shape)}")
-    with np.errstate(invalid="ignore"):  # NaN, which is not whole
+    with np.errstate(invalid="ignore"):  # NaN, which is not an integer
         whole = cells.astype(np.int64)
     if not np.array_equal(whole, cells):
         raise ValueError("must return whole rows and columns")
     if tuple(whole[0]) != tuple(start) or tuple(whole[-1]) != tuple(goal):
         ends = f"{whole[0].tolist()} to {whole[-1].tolist()}"
-        raise ValueError(f"its way goes from {ends}, not from {list(map(int, start))} to {list(map(int, goal))}")
+        raise ValueError(f"its path goes from {ends}, not from {list(map(int, start))} to {list(map(int, goal))}")
     if (whole < 0).any() or (whole >= classes.shape).any():
-        raise ValueError("its way leaves the map")
+        raise ValueError("its path leaves the map")
     steps = np.diff(whole, axis=0)
     if (np.abs(steps).max(1, initial=0) != 1).any():
         raise ValueError("its path has cells that do not neighbour the cell before them")
@@ -213,12 +213,12 @@ def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> 
         ends = classes[i, j], classes[p, q]
         unmeasured, rise = Cell.UNMEASURED in ends, abs(int(levels[i, j]) - int(levels[p, q]))
         if solid[i, j] or solid[p, q]:
-            raise ValueError(f"its way leads through the obstacle at {[p, q] if solid[p, q] else [i, j]}")
+            raise ValueError(f"its path leads through the obstacle at {[p, q] if solid[p, q] else [i, j]}")
         if not unmeasured and rise > 1:
-            raise ValueError(f"its way goes up or down {rise} levels between {[i, j]} and {[p, q]}")
+            raise ValueError(f"its path goes up or down {rise} levels between {[i, j]} and {[p, q]}")
         sides = int(solid[i, q]) + int(solid[p, j]) if di and dj else 0
         if sides == 2 or (sides == 1 and not cutting):
-            raise ValueError(f"its way cuts the corner of an obstacle between {[i, j]} and {[p, q]}")
+            raise ValueError(f"its path cuts the corner of an obstacle between {[i, j]} and {[p, q]}")
         motion = costs.c4 if unmeasured else costs.c3 if rise else costs.c2 if Cell.GATE in ends else costs.c1
         cost += costs.c0 * (DIAGONAL if di and dj else 1.0) + motion
         moves[n] = DIRECTION_OF[di, dj]
@@ -229,7 +229,7 @@ TOLD: set = set()
 
 
 def tell(function: MapPlanner, message: str) -> None:
-    """Say on stderr what is wrong with a planner, once in a process: a study of thousands of missions goes on."""
+    """Report on stderr what is wrong with a planner, once per process: a study of thousands of missions continues."""
     if function not in TOLD:
         TOLD.add(function)
         name = getattr(function, "__qualname__", type(function).__name__)

@@ -1,4 +1,4 @@
-"""Reading moves off a cost-to-go field, with one rule for ties."""
+"""Read moves from a cost-to-go field, with one rule for ties."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from jaxbiped.planning.arguments import grid_arguments, indices
 from jaxbiped.planning.cost_field import CostToGo
 from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, cell_kinds, kind_cost, move_kind
 
-TIE = 1e-6  # relative: ways whose costs differ by less are equally good; ten roundings of a float32
+TIE = 1e-6  # relative: paths whose costs differ by less are equally good; ten roundings of a float32
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Path:
-    """Cells from start to goal, and the moves between them; filled up with -1."""
+    """Cells from start to goal, and the moves between them; padded with -1."""
 
     cells_ij: Int[Array, "*B L1 2"]  # L1 = max_length + 1
     directions: Int8[Array, "*B L"]  # move from cell k to cell k + 1
     length: Int[Array, "*B"]  # number of moves
-    cost: Float[Array, "*B"]  # inf: no way
+    cost: Float[Array, "*B"]  # inf: no path
     valid: Bool[Array, "*B"]  # reaches the goal within max_length moves
 
 
 def path_arguments(path: Path) -> dict[str, tuple[Any, str]]:
-    """What is read of a path, checked, as `leading_shape` takes it."""
+    """The fields of a path that are read, checked, in the form for `leading_shape`."""
     if path.cells_ij.shape[-2:-1] != (path.directions.shape[-1] + 1,):
         raise InputError("must have one cell more than there are directions", field="path.cells_ij")
     return {
@@ -47,10 +47,10 @@ def path_arguments(path: Path) -> dict[str, tuple[Any, str]]:
 
 
 def pick(ahead: Float[Array, "B 8"], downhill: Bool[Array, "B 8"], heading: Int[Array, "B"]) -> Int8[Array, "B"]:
-    """The direction to take, -1 for none, where direction k costs `ahead[k]` all the way to the goal.
+    """The direction to take, -1 for none, if direction k costs `ahead[k]` all the way to the goal.
 
     Ties: of the directions within `TIE` of the best, the present heading if it is among them (fewer turns),
-    else the first in the order of `DIRECTIONS`. Only `downhill` directions count, so that reading ends.
+    else the first in the order of `DIRECTIONS`. Only `downhill` directions count, so that reading terminates.
     """
     ahead = jnp.where(downhill, ahead, jnp.inf)
     best = ahead.min(-1, keepdims=True)
@@ -61,17 +61,17 @@ def pick(ahead: Float[Array, "B 8"], downhill: Bool[Array, "B 8"], heading: Int[
 
 
 def read_path(field: CostToGo, edge_costs: Any, start_ij: Any, max_length: int, heading: Any = None) -> Path:
-    """The least path from each start, read off a field; ties as in `pick`.
+    """The lowest-cost path from each start, read from a field; ties as in `pick`.
 
     It ends at the goal; where moves cost nothing it may end at a cell from which the goal is reached for
-    nothing. Across dearer plateaus of moves that cost nothing (or less than a float32 of the cost to go can
-    show) it takes the fewest moves. Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`.
+    nothing. Across more expensive plateaus of moves that cost nothing (or less than the float32 resolution of the cost
+    to go) it takes the fewest moves. Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`.
 
     Args:
-      field: of these edge costs. Where it did not converge there is no path.
+      field: field of these edge costs. Where it did not converge there is no path.
       edge_costs: [*B, 8, H, W], none negative or NaN.
       start_ij: [*B, 2], integers; outside the grid there is no path.
-      max_length: static; number of moves that there is room for.
+      max_length: static; largest number of moves.
       heading: [*B], direction of the move before the first, -1 for none (the default).
 
     Raises:
@@ -92,7 +92,7 @@ def read_path(field: CostToGo, edge_costs: Any, start_ij: Any, max_length: int, 
 
 
 def no_path(start, max_length: int, batch: tuple[int, ...]) -> Path:
-    """What is read off a grid without cells."""
+    """The result for a grid without cells."""
     count = len(start)
     cells_ij = jnp.full((count, max_length + 1, 2), -1).at[:, 0].set(start)
     directions = jnp.full((count, max_length), -1, jnp.int8)
@@ -108,7 +108,7 @@ def _read_path(cost, edges, start, heading, max_length: int) -> Path:
     flat = good & (near == own)
     rank = jnp.where((good & (near < own)).any(1), 0.0, jnp.inf)
 
-    def closer(rank):  # moves on a plateau to its nearest way down
+    def closer(rank):  # moves on a plateau to its nearest descent
         near_rank = jnp.stack([_shifted(rank, di, dj) for di, dj in DIRECTIONS], 1)
         return jnp.minimum(rank, jnp.where(flat, near_rank + 1, jnp.inf).min(1)), near_rank
 
@@ -151,23 +151,23 @@ def next_step(
     heading: Any,
     length: int = 1,
 ) -> Int8[Array, "*B {length}"]:
-    """First `length` moves of the path from each robot's cell, read off `field(...).cost`.
+    """First `length` moves of the path from each robot's cell, read from `field(...).cost`.
 
-    Edge costs are computed around the cell only. The path of `read_path`, with the robot's present `heading`
+    Edge costs are computed around the cell only. It is the path of `read_path`, with the robot's present `heading`
     (a direction, -1 for none) as the move before the first. -1 where the path has ended, where there is none,
-    and on a plateau of moves that cost nothing, or less than a float32 of the cost to go can show (`read_path`
+    and on a plateau of moves that cost nothing, or less than the float32 resolution of the cost to go (`read_path`
     crosses those). Leading axes broadcast. May be called
     inside `jit`, `vmap` and `scan`.
 
     Args:
       field_cost: [*B, H, W].
-      classes, levels, costs, rules: as of `field`.
+      classes, levels, costs, rules: as for `field`.
       ij: [*B, 2], integers; outside the grid there is no path.
       heading: [*B].
       length: static.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete.
     """
     length, arrays = whole_number("length", length), {"field_cost": (reals("field_cost", field_cost, "H W"), "H W")}
     batch, inputs = grid_arguments(classes, levels, costs, rules, arrays=arrays, ij=ij, heading=heading)
@@ -195,7 +195,7 @@ def _next_step(classes, levels, costs, rules, field_cost, ij, heading, length: i
         levels_near, here = cell(levels, around, 0).T, (kinds[8], cell(levels, ij[:, None], 0)[:, 0])
         moves = []
         for k in range(8):
-            # the orthogonal neighbours of a diagonal direction are the directions next to it
+            # the orthogonal neighbours of a diagonal direction are the directions adjacent to it
             sides = (kinds[k - 1], kinds[(k + 1) % 8]) if k % 2 else None
             kind = move_kind(here, (kinds[k], levels_near[k]), sides, rules.corner_cutting)
             moves.append(kind_cost(kind, costs, sides is not None))

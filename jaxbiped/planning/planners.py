@@ -1,8 +1,8 @@
-"""Planners: from what a robot knows at a decision to the first moves of its way. Built in, and the base of all others.
+"""Planners: from a robot's knowledge at a decision to the first moves of its path. Built-in ones, and the base class.
 
 A planner is a frozen dataclass that is a pytree (`jax.tree_util.register_dataclass`): its type and its static fields
 choose the compiled program, its other fields are numbers that a sweep may change. Missions whose planners are of one
-kind share a program, whatever their numbers are.
+kind share a program, whatever their numbers.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ FINE, FAILED, TOO_SLOW = 0, 1, 2  # faults of a plan
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Problem:
-    """What a planner is asked at one decision. Leaves of a batch have another axis [B], the first."""
+    """The input of a planner at one decision. Leaves of a batch have a leading axis [B]."""
 
     classes: Int8[Array, "*B H W"]  # `mapping.Cell` of each cell, as the robot knows it
-    levels: Int8[Array, "*B H W"]  # of its ground
+    levels: Int8[Array, "*B H W"]  # level of each cell's ground
     start_ij: Int[Array, "*B 2"]  # the robot's cell: row (y) and column (x)
     goal_ij: Int[Array, "*B 2"]
     heading: Int[Array, "*B"]  # index into `planning.DIRECTIONS` of the direction that the robot faces
     yaw: Float[Array, "*B"]  # [rad] the same, exactly
     costs: Costs  # of Eq. 1 on this pitch
-    rules: Rules  # what the strategy dares
-    times: Times  # [s] what the mission's clock counts for each primitive
-    unit_seconds: Float[Array, "*B"]  # [s] what a unit of Eq. 1 stands for
-    surcharge: Float[Array, "*B 8 H W"] | None  # to be added to `edge_costs`; None: nothing
-    active: Bool[Array, "*B"]  # whether the answer is used; False for slots without a mission
-    state: Any = None  # of the planner, as its last `Route` left it
+    rules: Rules  # what the strategy may cross
+    times: Times  # [s] durations of the mission's clock for each primitive
+    unit_seconds: Float[Array, "*B"]  # [s] duration of a unit of Eq. 1
+    surcharge: Float[Array, "*B 8 H W"] | None  # added to `edge_costs`; None: nothing
+    active: Bool[Array, "*B"]  # whether the result is used; False for slots without a mission
+    state: Any = None  # state of the planner from its last `Route`
     pitch: float = field(default=0.05, metadata={"static": True})  # [m]
-    length: int = field(default=1, metadata={"static": True})  # moves that are wanted, at least 1
+    length: int = field(default=1, metadata={"static": True})  # number of moves needed, at least 1
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -55,57 +55,57 @@ class Problem:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Route:
-    """A planner's answer. Leaves of a batch have another axis [B], the first."""
+    """The result of a planner. Leaves of a batch have a leading axis [B]."""
 
-    directions: Int8[Array, "*B n"]  # the first moves, indices into `planning.DIRECTIONS`; -1 where there is none
-    cost_to_go: Float[Array, "*B H W"] | None = None  # what is left from each cell, for pictures
-    cost: Float[Array, "*B"] | None = None  # by Eq. 1, of the whole way; None or NaN: not known
-    seconds: Float[Array, "*B"] | None = None  # [s] that it took; None or NaN: not known
+    directions: Int8[Array, "*B n"]  # the first moves, indices into `planning.DIRECTIONS`; -1 for none
+    cost_to_go: Float[Array, "*B H W"] | None = None  # remaining cost from each cell, for pictures
+    cost: Float[Array, "*B"] | None = None  # by Eq. 1, of the whole path; None or NaN: not known
+    seconds: Float[Array, "*B"] | None = None  # [s] time taken; None or NaN: not known
     fault: Int8[Array, "*B"] | None = None  # FINE, FAILED or TOO_SLOW; None: fine
-    state: Any = None  # handed to the planner with its next problem
+    state: Any = None  # passed to the planner with its next problem
 
 
 class Planner:
-    """The base of planners: `plan` is written for one robot, and mapped over the batch.
+    """Base class of planners: `plan` is written for one robot, and mapped over the batch.
 
-    A planner with a memory says in `initial_state` what it begins a mission with, and gives a new state in each route.
+    A planner with memory returns its initial state from `initial_state`, and a new state in each route.
     """
 
     def plan(self, problem: Problem) -> Route:
-        """The first `problem.length` moves of the way from `start_ij` to `goal_ij`, fewer where the way is shorter.
+        """The first `problem.length` moves of the path from `start_ij` to `goal_ij`, fewer if the path is shorter.
 
         Moves that the rules forbid on the map end the mission as `planner_failed`.
         """
         raise NotImplementedError(f"{type(self).__name__} has no method `plan`")
 
     def initial_state(self, shape: tuple[int, int]) -> Any:
-        """The state at the beginning of a mission on a map of this shape: a pytree of arrays, or None."""
+        """The initial state of a mission on a map of this shape: a pytree of arrays, or None."""
         return None
 
     def plan_batch(self, problem: Problem) -> Route:
-        """The routes of a batch [B]; the leaves of the planner have that axis, too."""
+        """The routes of a batch [B]; the leaves of the planner also have that axis."""
         route = jax.vmap(type(self).plan)(self, problem)
         check_route(route, problem.state, type(self).__name__)
         return replace(route, fault=faults(problem, route, self))
 
     def whole_way(self, problem: Problem, route: Route) -> Int8[Array, "B n"]:
-        """All that is known of the way ahead, for pictures: moves as those of the route."""
+        """The known path ahead, for pictures, as moves like those of the route."""
         return route.directions
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class GridPlanner(Planner):
-    """The least cost by Eq. 1 over cells: an exact field, and the best neighbour of the robot's cell (paper, 2.3).
+    """The lowest cost by Eq. 1 over cells: an exact field, and the best neighbour of the robot's cell (paper, 2.3).
 
-    A subclass may have costs of its own: see `edge_costs`.
+    A subclass may have its own costs: see `edge_costs`.
     """
 
     def edge_costs(self, problem: Problem) -> Float[Array, "8 H W"]:
-        """What each move costs one robot, by default as Eq. 1 says; inf where it is forbidden.
+        """The cost of each move of one robot, by default that of Eq. 1; inf if it is forbidden.
 
-        In a subclass what Eq. 1 forbids stays forbidden, whatever it returns; costs must be finite and not negative
-        elsewhere, or inf.
+        In a subclass, moves forbidden by Eq. 1 stay forbidden, whatever it returns; elsewhere costs must be finite and
+        not negative, or inf.
         """
         costs = edge_costs(problem.classes, problem.levels, problem.costs, problem.rules)
         return costs if problem.surcharge is None else costs + problem.surcharge
@@ -135,7 +135,7 @@ class GridPlanner(Planner):
             wanted, got = list(usual.shape[1:]), f"{given.dtype} {list(given.shape[1:])}"
             raise InputError(f"edge_costs must return float32 {wanted}, not {got}", field=type(self).__name__)
         free = jnp.isfinite(usual)
-        wrong = jnp.any(free & ~(given >= 0), axis=(1, 2, 3))  # NaN is not, either
+        wrong = jnp.any(free & ~(given >= 0), axis=(1, 2, 3))  # also catches NaN
         moves = jnp.where(free & (given >= 0), given.astype(jnp.float32), jnp.inf)
         to_go = cost_to_go(moves, problem.goal_ij)
         path = read_path(to_go, moves, problem.start_ij, 3 * sum(problem.shape), problem.heading)
@@ -147,7 +147,8 @@ class GridPlanner(Planner):
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class HeadingPlanner(Planner):
-    """The least time over cells and headings, turns counted, by the mission's own clock. C4 alone still counts.
+    """The shortest time over cells and headings, including turns, by the mission's own clock. Of the costs, only C4
+    counts.
 
     Deviation: the paper plans over cells, by Eq. 1 (`GridPlanner`).
     """
@@ -163,7 +164,7 @@ class HeadingPlanner(Planner):
         return self.plan_batch(replace(problem, length=3 * sum(problem.shape))).directions
 
     def field(self, problem: Problem) -> HeadingField:
-        """Seconds to the goal of a batch, from each cell and heading."""
+        """Seconds to the goal for a batch, from each cell and heading."""
         grids, extra = (problem.classes, problem.levels), None
         if problem.surcharge is not None:
             extra = problem.unit_seconds.reshape(-1, 1, 1, 1) * problem.surcharge
@@ -178,7 +179,7 @@ def at(grid: Float[Array, "B H W"], ij: Int[Array, "B 2"]) -> Float[Array, "B"]:
 def cost_along(
     edges: Float[Array, "B 8 H W"], start_ij: Int[Array, "B 2"], directions: Int8[Array, "B n"], valid: Bool[Array, "B"]
 ) -> Float[Array, "B"]:
-    """What the moves from each start cost; NaN where they lead nowhere."""
+    """The cost of the moves from each start; NaN if they lead nowhere."""
     row, shape = jnp.arange(edges.shape[0]), jnp.array(edges.shape[2:])
 
     def step(carry, move):
@@ -199,15 +200,17 @@ def check_route(route: Any, given: Any, name: str) -> None:
     wanted, left = (jax.tree.map(lambda leaf: (jnp.shape(leaf), jnp.asarray(leaf).dtype.name), state)
                    for state in (given, route.state))  # fmt: skip
     if wanted != left:
-        message = f"a route's state must be as initial_state says, {wanted}, not {left} (shapes with the batch's axis)"
+        message = (
+            f"a route's state must be like that of initial_state, {wanted}, not {left} (shapes with the batch's axis)"
+        )
         raise InputError(message, field=name)
 
 
 def faults(problem: Problem, route: Route, planner: Planner) -> Int8[Array, "B"]:
-    """Whether the moves of each route are allowed on its map, and what the planner itself says of it.
+    """Whether the moves of each route are allowed on its map, together with the fault that the planner reports.
 
     Raises:
-      InputError: moves of another shape or type, named with the planner.
+      InputError: moves of another shape or type, with the planner's name.
     """
     name, count = type(planner).__name__, problem.start_ij.shape[0]
     moves = route.directions
@@ -215,7 +218,7 @@ def faults(problem: Problem, route: Route, planner: Planner) -> Int8[Array, "B"]
         got = f"{moves.dtype} {list(moves.shape[1:])}" if hasattr(moves, "shape") else type(moves).__name__
         raise InputError(f"a route's directions must be integers [n], not {got}", field=name)
     if moves.shape[1] < problem.length:
-        message = f"a route must have {problem.length} moves at least, -1 beyond its end"
+        message = f"a route must have at least {problem.length} moves, -1 beyond its end"
         raise InputError(message, field=name, value=list(moves.shape[1:]))
     row, shape = jnp.arange(count), jnp.array(problem.shape)
     kinds = cell_kinds(problem.classes, jax.tree.map(lambda leaf: leaf.reshape(-1, 1, 1), problem.rules))
@@ -248,9 +251,9 @@ def faults(problem: Problem, route: Route, planner: Planner) -> Int8[Array, "B"]
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class StraightLine(Planner):
-    """Straight to the goal, cell by cell in the direction that leads there best, and nowhere where that is forbidden.
+    """Straight to the goal, cell by cell in the direction that best leads there; stops where that is forbidden.
 
-    What a robot without a planner does; the strategy `blind_stop` does so without a map.
+    The behaviour of a robot without a planner; the strategy `blind_stop` does this without a map.
     """
 
     def plan(self, problem: Problem) -> Route:
@@ -266,7 +269,7 @@ class StraightLine(Planner):
 
         for _ in range(problem.length):
             away = (problem.goal_ij - ij).astype(jnp.float32)
-            # The move that brings it nearest to the goal; of two, the first.
+            # The move that brings it nearest to the goal; of two equal ones, the first.
             k = jnp.argmin(jnp.hypot(*(away[:, None] - moves.T)))
             sides = [about(ij + moves[k] * jnp.array(axis))[0] for axis in ((1, 0), (0, 1))]
             ends = about(ij), about(ij + moves[k])

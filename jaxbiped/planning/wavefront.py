@@ -1,7 +1,7 @@
-"""Cost-to-go by relaxing all cells at once until nothing changes: little depth and much work, as an accelerator wants.
+"""Cost-to-go by relaxing all cells at once until nothing changes: little depth and much work, as suits accelerators.
 
 Arrays have the batch last. `cost` is [H + 2, W + 2, B] with a ring of inf; so are `edges`, a tuple of the costs of
-leaving a cell in each of the eight `DIRECTIONS`, or of the first four only where a move costs what the move back costs.
+leaving a cell in each of the eight `DIRECTIONS`, or of the first four only if a move costs the same in both directions.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ DI, DJ = ([int(d) for d in column] for column in DIRECTIONS.T)
 def solve_edges(edges, goal_ij):
     """(cost [B, H, W] float32, rounds until nothing changed [B], whether the last changed nothing [B]); float64 sums.
 
-    Every round settles one more cell of each least path at least, so that `most_rounds` always do.
+    Every round settles at least one more cell of each lowest-cost path, so `most_rounds` are always enough.
     """
     height, width, batch = edges[0].shape
     most = most_rounds(height - 2, width - 2)
@@ -39,7 +39,7 @@ def solve_edges(edges, goal_ij):
 
 
 def most_rounds(height: int, width: int) -> int:
-    """Rounds after which nothing can change any more: the last of them shows it."""
+    """Number of rounds after which nothing can change any more: the last of them shows it."""
     return height * width + 1
 
 
@@ -53,7 +53,7 @@ def relaxed(edges, cost):
     new = at(cost, 0, 0)
     for k in range(8):
         edge = at(edges[k], 0, 0) if k < len(edges) else at(edges[k - 4], DI[k], DJ[k])
-        # not `jnp.minimum`, which also carries NaN along: there is none here, and a minimum is one instruction
+        # not `jnp.minimum`, which also propagates NaN: there is none here, and a minimum is one instruction
         other = at(cost, DI[k], DJ[k]) + edge.astype(cost.dtype)
         new = jnp.where(other < new, other, new)
     return cost.at[1:-1, 1:-1].set(new)

@@ -1,4 +1,4 @@
-"""Helpers for planners of other libraries: the cells that are free to one that knows no levels, and those of a line."""
+"""Helpers for planners of other libraries: the free cells for planners without levels, and the cells along a line."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from jaxbiped.planning.costs import DIRECTIONS
 def free_cells(
     classes: Int8[np.ndarray, "H W"], levels: Int8[np.ndarray, "H W"], start_ij: tuple[int, int]
 ) -> Bool[np.ndarray, "H W"]:
-    """Cells between which all moves are allowed, for planners that look at cells and not at moves.
+    """Cells between which all moves are allowed, for planners that consider cells instead of moves.
 
-    Those are no obstacle, and no more than one level above any neighbour. The robot's own cell is always free.
+    These are cells that are not obstacles, and at most one level above any neighbour. The robot's own cell is always
+    free.
     """
     free = classes != Cell.OBSTACLE
     known = free & (classes != Cell.UNMEASURED)
@@ -31,7 +32,7 @@ def free_cells(
 
 
 def cells_along(points_ij: Sequence[Sequence[float]] | Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "L 2"]:
-    """The cells that a line through points crosses, each beside the one before it, never diagonally.
+    """The cells that a line through points crosses, each adjacent to the one before, never diagonally.
 
     Args:
       points_ij: row and column, as reals; cell (i, j) reaches from i to i + 1 and from j to j + 1.
@@ -41,7 +42,7 @@ def cells_along(points_ij: Sequence[Sequence[float]] | Float[np.ndarray, "n 2"])
     for a, b in itertools.pairwise(points):
         crossings = []
         for axis in (0, 1):
-            # A point on a line between two cells is of the upper one, so going down from it crosses that line at once.
+            # A point on the line between two cells belongs to the upper one: going down from it crosses the line.
             low, high = sorted((a[axis], b[axis]))
             lines = np.arange(np.floor(low) + 1, np.floor(high) + 1)
             way = 1 if b[axis] > a[axis] else -1

@@ -1,4 +1,4 @@
-"""A mission as an animated GIF: the map as it grows, the robot, what it sees and where it means to go."""
+"""A mission as an animated GIF: the growing map, the robot, its view and its plan."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ FIELD_OF_VIEW = math.radians(97)  # across, of the stereo camera
 VIEW_RANGE = 0.60  # [m] drawn; the camera sees farther
 WIDTH = 6.4  # [inch] of the figure
 FRAMES_PER_SECOND, LAST_FRAME = 5, 2.0  # [1/s], [s]
-COMMON_COLOURS, PICTURE_COLOURS = 120, 240  # of the palette, besides the map's own; with pictures beside it
-PICTURE_WIDTH = 3.2  # [inch] of them
+COMMON_COLOURS, PICTURE_COLOURS = 120, 240  # in the palette, besides the map's; with pictures beside it
+PICTURE_WIDTH = 3.2  # [inch] of the pictures
 
 
 class Scene:
@@ -72,7 +72,7 @@ class Scene:
         frame(self.ax, self.extent, CENTIMETRES)
         self.heading = self.ax.set_title(" ", fontsize=10)
         self.canvas.draw()
-        self.figure.set_layout_engine("none")  # finding the layout takes longer than drawing
+        self.figure.set_layout_engine("none")  # computing the layout takes longer than drawing
         self.inside = [
             artist
             for ax in self.figure.axes
@@ -80,7 +80,7 @@ class Scene:
             if artist not in (ax.patch, ax.xaxis, ax.yaxis)
         ]
         for artist in self.inside:
-            artist.set_animated(True)  # left out of what is drawn once: legend and ticks, which take most of the time
+            artist.set_animated(True)  # excluded from what is drawn once: legend and ticks, which take most of the time
         self.canvas.draw()
         self.around = self.canvas.copy_from_bbox(self.figure.bbox)
 
@@ -90,7 +90,7 @@ class Scene:
         return tuple(value * self.k for value in moment(self.log, 0).extent)
 
     def draw_still(self) -> None:
-        """What stays: lines between cells, true boxes, landmarks, start and goal."""
+        """Draw what stays: lines between cells, true boxes, landmarks, start and goal."""
         log, k, ax = self.log, self.k, self.ax
         if log.classes[0].size <= MOST_CELLS_LINED:
             draw_lines(ax, moment(log, 0), k)
@@ -106,7 +106,7 @@ class Scene:
         draw_goal(ax, tuple(log.goal_xy), GOAL_RADIUS, k)
 
     def draw_pictures(self, left: Axes, disparity: Axes) -> None:
-        """What the robot sees, and what it measures of it."""
+        """Draw the robot's view, and the disparity measured from it."""
         pictures = self.log.pictures
         self.nearest = max(float(np.quantile(each.disparity, 0.995)) for each in pictures) or 1.0
         self.pictures = left.imshow(pictures[0].left), disparity.imshow(disparity_image(pictures[0], self.nearest))
@@ -117,7 +117,7 @@ class Scene:
                 spine.set(color="#888888", linewidth=0.8)
 
     def draw_moving(self) -> None:
-        """What moves, at the origin of the robot's frame: view, track, plan, the robot and its belief."""
+        """Draw what moves, at the origin of the robot's frame: view, track, plan, the robot and its belief."""
         ax, k = self.ax, self.k
         half = math.degrees(FIELD_OF_VIEW) / 2
         wedge = patches.Wedge((0, 0), VIEW_RANGE * k, -half, half, fc="#ffe14d2c", ec="#c79a00b0", lw=1.0, zorder=3.5)
@@ -151,7 +151,7 @@ class Scene:
         self.heading.set_text(f"{name}{log.time[t]:5.0f} s   step {t} of {len(log.time) - 1}   {caption(log, t)}")
 
     def at(self, xyyaw: Float[np.ndarray, "3"]) -> Transform:
-        """From the robot's frame, in axis units, to the page."""
+        """The transform from the robot's frame, in axis units, to the page."""
         x, y, yaw = xyyaw
         return Affine2D().rotate(float(yaw)).translate(float(x) * self.k, float(y) * self.k) + self.ax.transData
 
@@ -166,10 +166,10 @@ class Scene:
 
 @own_style()
 def save_gif(path: str | Path, log: MissionLog, *, title: str = "", dpi: int = 90) -> None:
-    """Write a mission as GIF, one frame a moment at 5 frames a second, the last one held for 2 s.
+    """Write a mission as a GIF, one frame per moment at 5 frames a second, with the last one held for 2 s.
 
-    Where the log has pictures, they stand beside the map, as in the paper's Figs. 3 and 6.
-    The robot's true place is a filled footprint with its nose, its belief a dotted one; the wedge is the
+    If the log has pictures, they are shown beside the map, as in the paper's Figs. 3 and 6.
+    The robot's true pose is a filled footprint with its nose, its belief a dotted one; the wedge is the
     camera's field of view.
 
     Raises:
@@ -191,9 +191,9 @@ def disparity_image(picture: Picture, nearest: float) -> UInt8[np.ndarray, "h w 
 
 
 def shared_palette(frames: list[Image.Image], colours: int) -> Image.Image:
-    """One palette for all frames: the map's own colours, and the commonest others of three frames.
+    """One palette for all frames: the map's own colours, and the most common others in three frames.
 
-    One for all, so that colours do not flicker; the map's own, so that a class seen in a few cells keeps its colour.
+    One palette avoids flicker; the map's own colours are included so that a class seen in few cells keeps its colour.
     """
     strip = np.concatenate([np.asarray(frame) for frame in (frames[0], frames[len(frames) // 2], frames[-1])])
     common = Image.fromarray(strip).quantize(colours, method=Image.Quantize.MEDIANCUT).getpalette()

@@ -1,4 +1,4 @@
-"""The project's question, answered in sentences that claim no more than the numbers carry."""
+"""The project's question, answered in sentences that claim no more than the numbers support."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def part(pair: PairComparison, measure: Measure) -> tuple[Estimate, float | None
 
 
 def paired_metric(pair: PairComparison, measure: Measure) -> PairedMetric | None:
-    """The pair's numbers of a measure that is not success; None where they were not asked for."""
+    """The pair's numbers for a measure other than success; None if it was not computed."""
     return pair.metrics.get(measure.name) if measure not in MEASURES else getattr(pair, measure.name)
 
 
 def ranks_disagree(pair: PairComparison, measure: Measure) -> bool:
-    """Whether the first is smaller on most arenas and yet greater on average, or the other way round."""
+    """Whether the first is smaller on most arenas and yet greater on average, or vice versa."""
     if measure is SUCCESS:
         return False
     metric = paired_metric(pair, measure)
@@ -38,10 +38,10 @@ def ranks_disagree(pair: PairComparison, measure: Measure) -> bool:
 
 
 def verdict(pair: PairComparison, measure: Measure, alpha: float = ALPHA) -> str:
-    """AHEAD or BEHIND (the first of the pair), where it is shown; else OPEN.
+    """AHEAD or BEHIND (the first of the pair) if a difference is shown; else OPEN.
 
-    Shown is a difference whose corrected p is below `alpha`, whose interval leaves zero out, and, for a mean, whose
-    ranks point the same way: the p-value there is a rank test's.
+    A difference is shown if its corrected p is below `alpha`, its interval excludes zero, and, for a mean, the ranks
+    point the same way, since the p-value is then that of a rank test.
     """
     difference, p = part(pair, measure)
     if p is None or p >= alpha or difference.low is None or ranks_disagree(pair, measure):
@@ -52,7 +52,7 @@ def verdict(pair: PairComparison, measure: Measure, alpha: float = ALPHA) -> str
 
 
 def answer(comparison: Comparison, alpha: float = ALPHA) -> tuple[str, ...]:
-    """Sentences, most important first; empty where no pair was compared."""
+    """Sentences, most important first; empty if no pair was compared."""
     if comparison.question is None:
         return ()
     pair = comparison.question
@@ -94,7 +94,7 @@ def success_sentence(comparison: Comparison, pair: PairComparison, alpha: float)
 
 
 def metric_sentence(pair: PairComparison, measure: Measure, alpha: float) -> str:
-    """How far or how long on the arenas that both solved."""
+    """Distance or time on the arenas that both solved."""
     metric: PairedMetric = getattr(pair, measure.name)
     if not metric.mean.valid:
         return f"No arena was solved by both, so {measure.name} cannot be compared."
@@ -102,9 +102,7 @@ def metric_sentence(pair: PairComparison, measure: Measure, alpha: float) -> str
     text = f"On the {metric.n} arenas that both solved, {pair.first} {verb} {claim(pair, measure, alpha)}"
     if ranks_disagree(pair, measure) and metric.mean.estimate:
         often = 100 * metric.improvement.estimate
-        text += (
-            f"; average and ranks point different ways ({pair.first} has the smaller {measure.name} with probability"
-        )
+        text += f"; average and ranks disagree ({pair.first} has the smaller {measure.name} with probability"
         text += f" {often:.0f} %, ties counted half)"
     return f"{text}."
 
@@ -113,7 +111,7 @@ def claim(pair: PairComparison, measure: Measure, alpha: float) -> str:
     """A difference in words, with its interval and p."""
     difference, p = part(pair, measure)
     limits = interval(difference, measure.scale, measure.digits)
-    numbers = f"{limits}, p {p_value(p)}" if limits else "too few arenas, or too equal, for an interval"
+    numbers = f"{limits}, p {p_value(p)}" if limits else "too few arenas, or too similar, for an interval"
     amount = f"{abs(difference.estimate) * measure.scale:.{measure.digits}f} {measure.unit}"
     direction = measure.more if difference.estimate > 0 else measure.less
     text = f"{amount} {direction}" if difference.estimate else f"{amount} more or less"
@@ -122,7 +120,7 @@ def claim(pair: PairComparison, measure: Measure, alpha: float) -> str:
 
 
 def family_sentence(pairs: Sequence[PairComparison], measure: Measure, alpha: float) -> str:
-    """In which families the first is ahead by a measure, in which behind, in which neither is shown."""
+    """The families in which the first is ahead in a measure, behind, or neither is shown."""
     groups = {AHEAD: [], BEHIND: [], OPEN: []}
     for pair in pairs:
         difference, _ = part(pair, measure)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Axis:
-    """In which unit, and whether y points down the page."""
+    """The unit of the axes, and whether y points down the page."""
 
     unit: str = "cm"
     per_metre: float = 100.0

@@ -1,4 +1,4 @@
-"""`summary.md`: the question, its answer, tables and figures of a results folder, written anew from its rows."""
+"""`summary.md`: the question, its answer, tables and figures of a results folder, rewritten from its rows."""
 
 from __future__ import annotations
 
@@ -27,39 +27,39 @@ QUESTION_TEXT = "When, and by how much, does bump-aware planning beat floor-only
 
 LIMITATIONS = (
     "Distance and time are compared on arenas that both strategies solved. These are not a random sample of the "
-    "arenas: the harder one is left out wherever one of the two fails, so the differences hold for solved arenas only.",
+    "arenas: an arena is left out if either of the two fails, so the differences hold for solved arenas only.",
     "The arenas come from the families of this program; a rate over all families depends on their mix.",
-    "McNemar's test is exact and the interval of the difference is asymptotic, so that an interval can just leave out "
-    "zero where the corrected p-value is above 0.05. A difference is called shown only when both say so.",
-    "Wilcoxon's test asks about ranks, the interval about a mean. Where they point different ways nothing is claimed.",
-    "Strata are corrected among themselves, each kind (families, thirds of difficulty) apart from the overall table.",
-    "That no difference is shown does not say that there is none: see the intervals.",
+    "McNemar's test is exact and the interval of the difference is asymptotic, so an interval can just exclude "
+    "zero where the corrected p-value is above 0.05. A difference is called shown only if both agree.",
+    "Wilcoxon's test is about ranks, the interval about a mean. Where they disagree, nothing is claimed.",
+    "Strata of each kind (families, thirds of difficulty) are corrected separately from the overall table.",
+    "If no difference is shown, there may still be one: see the intervals.",
 )
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a report is made of."""
+    """The parts of a report."""
 
     folder: Path
     comparison: Comparison
     manifest: Manifest
     answer: tuple[str, ...]  # sentences, most important first
     files: tuple[Path, ...]  # written: page, summary and figures
-    remarks: tuple[str, ...] = ()  # what to know before anything else
+    remarks: tuple[str, ...] = ()  # what to read first
 
 
 def write_comparison_report(folder: str | Path, *, point: int = 0, resamples: int = 4999, examples: int = 0) -> Report:
-    """Compare the strategies of a results folder at one point: `report.html`, `summary.md` and figures are written.
+    """Compare the strategies of a results folder at one point, and write `report.html`, `summary.md` and figures.
 
-    `folder_report.write_report` knows sweeps, too.
+    `folder_report.write_report` handles sweeps, too.
 
-    May be called again at any time: the same rows give the same report. Seeds the bootstraps with the study's seed.
+    May be called again at any time: the same rows give the same report. The bootstraps use the study's seed.
 
     Args:
       point: the sweep point to report on.
-      resamples: of the bootstraps.
-      examples: arenas where the two strategies of the question differ most, to be played again and drawn; this
+      resamples: resamples of the bootstraps.
+      examples: number of arenas where the two strategies of the question differ most, to be replayed and drawn; this
         compiles a mission.
 
     Raises:
@@ -95,7 +95,7 @@ def write_comparison_report(folder: str | Path, *, point: int = 0, resamples: in
 def looked_at(
     folder: Path, frame: pl.DataFrame, comparison: Comparison, manifest: Manifest, count: int
 ) -> tuple[Section, ...]:
-    """A section with the missions of `count` arenas where the strategies of the question differ most, if any."""
+    """A section with missions of the `count` arenas where the strategies of the question differ most, if any."""
     if count == 0 or comparison.question is None:
         return ()
     values = read_points(folder).filter(pl.col("point") == comparison.point).row(0, named=True)
@@ -110,7 +110,7 @@ def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str],
 
     Args:
       figures: file names beside the summary, with captions.
-      remarks: what to know before anything else.
+      remarks: what to read first.
     """
     lines = ["# Strategies compared", ""]
     for remark in remarks:
@@ -136,13 +136,13 @@ def summary(comparison: Comparison, manifest: Manifest, figures: dict[str, str],
 
 
 def unfinished(comparison: Comparison, manifest: Manifest) -> str:
-    """How far a study is that has not ended."""
+    """How far an unfinished study is."""
     done = comparison.summary(comparison.strategies[0]).n
     return f"This study is not finished: it has {done} of {manifest.arenas} arenas."
 
 
 def question(comparison: Comparison) -> str:
-    """What the report answers."""
+    """The question that the report answers."""
     if comparison.question == QUESTION:
         return QUESTION_TEXT
     first, second = comparison.question
@@ -150,18 +150,18 @@ def question(comparison: Comparison) -> str:
 
 
 def pilot(comparison: Comparison) -> str:
-    """How many arenas would show the observed difference in success, for who plans the next study."""
+    """How many arenas would show the observed difference in success, for planning the next study."""
     pair = comparison.pair(*comparison.question)
     first, second = pair.first_only / pair.success.n, pair.second_only / pair.success.n
     text = f"Only {pair.first} reached the goal on {pair.first_only} arenas, only {pair.second} on {pair.second_only}."
     if first == second:
         return text
     n = sample_size(first, second, power=0.8)
-    return f"{text} Were these the true shares, {n} arenas would show the difference with a power of 80 % (McNemar)."
+    return f"{text} If these were the true shares, {n} arenas would show the difference with a power of 80 % (McNemar)."
 
 
 def provenance(comparison: Comparison, manifest: Manifest) -> list[str]:
-    """Where the numbers come from, so that anyone can make them again."""
+    """Where the numbers come from, so that anyone can reproduce them."""
     versions = ", ".join(f"{name} {version}" for name, version in manifest.versions.items())
     speed = ""
     if manifest.wall_time and manifest.rows:

@@ -18,9 +18,9 @@ from jaxbiped.report.style import own_style
 from jaxbiped.study.replay import Origin, examples, play_again
 
 KEY = (
-    "Maps as the robots held them at the end: grey floor, blue bump with its level, purple gate, red obstacle and all "
-    "that is too near to one, white unmeasured. Outlines are the true boxes, discs and squares landmarks; the black "
-    "line was walked, from the ring to the cross."
+    "Maps as the robots held them at the end: grey floor, blue bump with its level, purple gate, red obstacle and "
+    "all that is too close, white unmeasured. Outlines are the true boxes; discs and squares are landmarks; the black "
+    "line is the robot's track, from the ring to the cross."
 )
 DPI = 110
 
@@ -28,11 +28,11 @@ DPI = 110
 def example_section(
     frame: pl.DataFrame, names: tuple[str, str], origins: tuple[Origin, Origin], count: int
 ) -> Section | None:
-    """Play the missions where two sides differ most again, and draw them; None where they nowhere differ.
+    """Replay and draw the missions where two sides differ most; None if they differ nowhere.
 
     Args:
-      frame: rows of two names in `strategy`.
-      names: the two, in the order of `origins`.
+      frame: rows with two names in `strategy`.
+      names: the two names, in the order of `origins`.
       origins: where their missions come from.
     """
     found = examples(frame, *names, count)
@@ -53,7 +53,7 @@ def example_section(
             if row["code"] != missions[k].code.label:
                 changed.append(f"{name} on arena {example.arena} ended as {row['code']} when it was stored")
             start = ""
-    text = (KEY, f"Played again here, these differ: {'; '.join(changed)}.") if changed else (KEY,)
+    text = (KEY, f"Replayed here, these differ: {'; '.join(changed)}.") if changed else (KEY,)
     return Section(title, text, tuple(plots), kind="pairs")
 
 
@@ -64,7 +64,7 @@ def ending(mission: Mission) -> str:
 
 @own_style()
 def last_map(mission: Mission) -> Figure:
-    """The map that the robot held at the end, the track that it walked, and what was really there."""
+    """The map that the robot held at the end, its track, and the true arena."""
     log = mission.log
     figure = Figure(figsize=(WIDTH, WIDTH * float(log.size_xy[1] / log.size_xy[0])), layout="constrained")
     draw_map(

@@ -1,4 +1,4 @@
-"""Figures of a comparison, as matplotlib figures that no window system knows of."""
+"""Figures of a comparison, as matplotlib figures that need no window system."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from jaxbiped.report.style import own_style
 from jaxbiped.report.words import OPEN
 from jaxbiped.statistics import ALL, CODES, Comparison, Estimate, Stratum, proportion
 
-# Okabe and Ito's colours, which colour-blind people tell apart: one for each strategy, in every figure.
+# Okabe and Ito's colours, which colour-blind people can distinguish: one for each strategy, in every figure.
 COLOURS = {
     "full": "#0072B2",
     "bump_aware": "#009E73",
@@ -37,7 +37,7 @@ CODE_COLOURS = {
     "planner_failed": "#5D3A9B",
     "planner_timeout": "#A98BD0",
 }
-OWN_COLOURS = ("#D55E00", "#56B4E9", "#8E1F1C", "#5D3A9B", "#B0A000", "#000000")  # of strategies that people bring
+OWN_COLOURS = ("#D55E00", "#56B4E9", "#8E1F1C", "#5D3A9B", "#B0A000", "#000000")  # for users' own strategies
 FAMILY_COLOURS = ("#0072B2", "#D55E00", "#E69F00", "#CC79A7", "#009E73", "#56B4E9", "#7F7F7F")
 INK, GRID = "#333333", "#DDDDDD"
 BINS = 5  # of difficulty
@@ -49,7 +49,7 @@ def write_figures(folder: str | Path, frame: pl.DataFrame, comparison: Compariso
     """Write the figures that the rows have data for as PNGs into `folder`; file name to caption, in order.
 
     Args:
-      folder: exists.
+      folder: an existing folder.
       frame: the rows that `comparison` was made from.
     """
     frame = frame.filter(pl.col("point") == comparison.point)
@@ -61,7 +61,9 @@ def write_figures(folder: str | Path, frame: pl.DataFrame, comparison: Compariso
     if comparison.question:
         first, second = comparison.question
         caption = f"{first} minus {second} on the same arenas: success, and mean distance and time where both solved. "
-        caption += "Filled: a difference is shown after Holm's correction. Cross: too few or too equal for an interval."
+        caption += (
+            "Filled: a difference is shown after Holm's correction. Cross: too few or too similar for an interval."
+        )
         figures["differences.png"] = (differences(comparison, first, second), caption)
         caption = f"Time of {first} against {second} on arenas that both solved."
         figures["times.png"] = (times(frame, first, second), caption)
@@ -71,7 +73,7 @@ def write_figures(folder: str | Path, frame: pl.DataFrame, comparison: Compariso
 
 
 def saver(figure: Figure) -> Callable[[object], None]:
-    """How to write a figure into an open file; the same figure gives the same bytes."""
+    """A function that writes a figure to an open file; the same figure gives the same bytes."""
 
     @own_style()
     def save(file: object) -> None:
@@ -103,7 +105,7 @@ def success(comparison: Comparison) -> Figure:
 
 @own_style()
 def codes(comparison: Comparison) -> Figure:
-    """Stacked bars: a strategy each, the shares of how its missions ended."""
+    """Stacked bars, one per strategy: the shares of how its missions ended."""
     names = comparison.strategies
     figure, ax = canvas(8.4, 0.8 + 0.5 * len(names), grid="x")
     summaries = [comparison.summary(name) for name in names]
@@ -155,7 +157,7 @@ def differences(comparison: Comparison, first: str, second: str) -> Figure:
 
 
 def forest_row(ax: Axes, y: int, value: Estimate, measure: Measure, stratum: Stratum, shown: bool) -> None:
-    """One estimate with its interval; a cross where there is no interval, words where there is nothing."""
+    """One estimate with its interval; a cross if there is no interval, words if there is no estimate."""
     if not value.valid:
         ax.annotate("none solved by both", (0, y), ha="center", va="center", fontsize=7, color=INK, backgroundcolor="w")
         return
@@ -171,7 +173,7 @@ def forest_row(ax: Axes, y: int, value: Estimate, measure: Measure, stratum: Str
 
 @own_style()
 def times(frame: pl.DataFrame, first: str, second: str, size: tuple[float, float] = (5.6, 5.4)) -> Figure:
-    """A dot for each arena that both solved: below the diagonal the first is faster."""
+    """A dot for each arena that both solved: below the diagonal, the first is faster."""
     sides = [frame.filter((pl.col("strategy") == name) & pl.col("success")) for name in (first, second)]
     both = sides[0].join(sides[1].select("arena", "time"), on="arena", suffix="_second")
     figure, ax = canvas(*size, grid="both")
@@ -224,10 +226,10 @@ def difficulty(frame: pl.DataFrame, comparison: Comparison, size: tuple[float, f
 
 
 def look(name: str, names: Sequence[str]) -> tuple[str, str]:
-    """Colour and mark of one of `names`: a strategy's own, else by its place among them."""
+    """Colour and marker of one of `names`: a strategy's own, else by its position among them."""
     if name in COLOURS:
         return COLOURS[name], MARKERS[name]
-    if set(names) & set(COLOURS):  # beside those that are built in
+    if set(names) & set(COLOURS):  # beside built-in ones
         place = [other for other in names if other not in COLOURS].index(name) % len(OWN_COLOURS)
         return OWN_COLOURS[place], "P*Xdph"[place]
     place = names.index(name) % len(FAMILY_COLOURS)
@@ -249,7 +251,7 @@ def error_bars(
 
 
 def dodge(count: int, width: float) -> np.ndarray:
-    """Offsets that lie side by side within `width`, centred."""
+    """Offsets side by side within `width`, centred."""
     return (np.arange(count) - (count - 1) / 2) * width / max(count - 1, 1)
 
 
@@ -262,7 +264,7 @@ def canvas(width: float, height: float, grid: str = "y") -> tuple[Figure, Axes]:
 
 
 def style(ax: Axes, grid: str) -> None:
-    """Light lines behind the data, no frame above and to the right."""
+    """Light grid lines behind the data, no frame above and to the right."""
     ax.grid(axis=grid, color=GRID, lw=0.7)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)

@@ -18,14 +18,14 @@ from jaxbiped.study import read_points
 def write_report(
     folder: str | Path, *, point: int | None = None, resamples: int | None = None, examples: int = 0
 ) -> Report | SweepReport:
-    """Write `report.html`, `summary.md` and figures into a results folder: of its sweep, where it has several points.
+    """Write `report.html`, `summary.md` and figures into a results folder; for several points, those of a sweep.
 
     May be called again at any time: the same rows give the same report.
 
     Args:
-      point: at which strategies are compared in full; of a sweep by default that with the config's own values.
-      resamples: of the bootstraps; by default 4999, and 999 at each point of a sweep.
-      examples: arenas where the two strategies of the question differ most, to be played again and drawn; this
+      point: point at which strategies are compared in full; for a sweep, by default that with the config's own values.
+      resamples: resamples of the bootstraps; by default 4999, and 999 at each point of a sweep.
+      examples: number of arenas where the two strategies of the question differ most, to be replayed and drawn; this
         compiles a mission.
 
     Raises:
@@ -40,5 +40,5 @@ def write_report(
 
 
 def terminal_report(report: Report | SweepReport) -> Group:
-    """What is printed of a report."""
+    """The part of a report that is printed."""
     return sweep_terminal(report) if isinstance(report, SweepReport) else comparison_terminal(report.comparison)

@@ -1,4 +1,4 @@
-"""Tables of the HTML page: sheets whose numbers stand with their decimal points under each other."""
+"""Tables of the HTML page: sheets whose numbers are aligned at the decimal point."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ INTERVAL = re.compile(r"(?:(\S+) )?\[(\S+), (\S+)\](.*)$")
 
 @dataclass(frozen=True)
 class Cell:
-    """A number or words, perhaps with an interval. Pads are invisible digits that bring decimal points in line."""
+    """A number or words, perhaps with an interval. Pads are invisible digits that align decimal points."""
 
     value: str
     pad: str = ""
@@ -22,14 +22,14 @@ class Cell:
     low_pad: str = ""
     high: str = ""
     high_pad: str = ""
-    width: int = 0  # characters that a limit of this column takes
+    width: int = 0  # characters of the widest limit in this column
     after: str = ""
-    gap: bool = False  # whether room is left for an interval, since others of the column have one
+    gap: bool = False  # whether to leave room for an interval, since other cells of the column have one
 
 
 @dataclass(frozen=True)
 class Line:
-    """A row; without cells the heading of those below it."""
+    """A row; without cells, the heading of the rows below it."""
 
     name: str
     cells: tuple[Cell, ...]
@@ -46,7 +46,7 @@ class Grid:
 
 
 def to_grid(sheet: Sheet) -> Grid:
-    """A sheet for the page. Its cells are read as tables.py writes them: "5.8", "[4.2, 8.0]" or "5.8 [4.2, 8.0]"."""
+    """A sheet for the page. Cells are parsed in the format of tables.py: "5.8", "[4.2, 8.0]" or "5.8 [4.2, 8.0]"."""
     rows = [row for group in sheet.groups for row in group]
     columns = [aligned([parsed(row[k]) for row in rows]) for k in range(1, len(sheet.columns))]
     lines = [
@@ -99,12 +99,12 @@ def decimals(text: str) -> int:
 
 
 def padding(text: str, wanted: int) -> str:
-    """What a number lacks to have the wanted number of decimals."""
+    """The digits that a number lacks to have the wanted number of decimals."""
     if not NUMBER.match(text) or decimals(text) == wanted:
         return ""
     return "0" * (wanted - decimals(text)) if decimals(text) else "." + "0" * wanted
 
 
 def typeset(text: str) -> str:
-    """With true minus signs, and a true dash for what is not there."""
+    """Text with true minus signs, and a true dash for a missing value."""
     return "–" if text == NONE else re.sub(r"(?<![\w.])-(?=[\d ])", "−", text)

@@ -13,7 +13,7 @@ from jaxbiped.biped.gait import PrimitiveTable
 from jaxbiped.biped.trial import RIMS, nominal_edge
 from jaxbiped.mission.library import Entry, Feet, LibraryConfig, Rims, Window
 
-SET = "mild"  # whose trials the library's displacements are of
+SET = "mild"  # the set of trials that the library's displacements come from
 
 
 def library(
@@ -24,7 +24,7 @@ def library(
     seed: int,
     command: str,
 ) -> LibraryConfig:
-    """The library of what was verified. A mission needs all primitives; a library of some can be written, not read.
+    """The library of verified primitives. A mission needs all; a library of some can be written, but not read.
 
     Args:
       rows: trials as `commands.primitives` writes them.
@@ -39,7 +39,7 @@ def library(
 
 
 def rims(rows: pl.DataFrame, forward: float, offset: float) -> Rims:
-    """Where edges that are not expected may lie: half way between the nearest that is borne and the next."""
+    """Where unexpected edges may lie: half way between the nearest tolerated edge and the next."""
     found = {}
     for rim in RIMS:
         tried = rows.filter(pl.col("set") == f"rim {rim}").sort("edge")
@@ -51,7 +51,7 @@ def rims(rows: pl.DataFrame, forward: float, offset: float) -> Rims:
 
 
 def entry(rows: pl.DataFrame, table: PrimitiveTable, robot: RobotModelConfig) -> Entry:
-    """Of one primitive."""
+    """The library entry of one primitive."""
     request, mild = table.request, rows.filter(pl.col("set") == SET)
     mean, covariance = displacement(mild)
     asked = (request.forward, request.left, request.turn)
@@ -73,7 +73,7 @@ def entry(rows: pl.DataFrame, table: PrimitiveTable, robot: RobotModelConfig) ->
 
 
 def displacement(rows: pl.DataFrame) -> tuple[np.ndarray, np.ndarray]:
-    """Mean [3] and covariance [3, 3] of the error (x, y, yaw) [m, m, rad] of the trials that did not fall."""
+    """Mean [3] and covariance [3, 3] of the error (x, y, yaw) [m, m, rad] over the trials that did not fall."""
     errors = rows.filter(~pl.col("fell")).select("error_x", "error_y", "error_yaw").to_numpy()
     if len(errors) < 2:
         return (errors.mean(axis=0) if len(errors) else np.zeros(3)), np.zeros((3, 3))
@@ -81,7 +81,7 @@ def displacement(rows: pl.DataFrame) -> tuple[np.ndarray, np.ndarray]:
 
 
 def window(rows: pl.DataFrame, ahead: float) -> Window:
-    """How a step ends by the distance and the yaw of its edge."""
+    """How a step ends, by the distance and the yaw of its edge."""
     shares = rows.group_by("edge", "yaw").agg(stands=1.0 - pl.col("fell").mean()).sort("edge", "yaw")
     edges, yaws = shares["edge"].unique().sort(), shares["yaw"].unique().sort()
     stands = shares["stands"].to_numpy().reshape(len(edges), len(yaws))
@@ -91,15 +91,15 @@ def window(rows: pl.DataFrame, ahead: float) -> Window:
 
 
 def rounded(values) -> tuple[float, ...]:
-    """Six significant digits: more than the trials know."""
+    """Six significant digits: more than the trials determine."""
     return tuple(float(f"{value:.6g}") for value in values)
 
 
 def library_text(made: LibraryConfig) -> str:
-    """The library as TOML, whose header says how it was made."""
+    """The library as TOML, with a header that says how it was made."""
     lines = [
-        "# What simulation measured of each primitive; `--executor sampled` draws from it. Written by the command,",
-        "# below, not to be edited. Lengths in metres, angles in radians, durations in seconds.",
+        "# What simulation measured for each primitive; `--executor sampled` draws from it. Written by the command",
+        "# below; do not edit. Lengths in metres, angles in radians, durations in seconds.",
         f"command = {quoted(made.command)}",
         f"pace = {quoted(made.pace)}",
         f"seed = {made.seed}",
@@ -122,7 +122,7 @@ def library_text(made: LibraryConfig) -> str:
 
 
 def block(key: str, rows) -> list[str]:
-    """A table of numbers, a line a row."""
+    """A table of numbers, one line per row."""
     return [f"{key} = [", *(f"    {written(row)}," for row in rows), "]"]
 
 

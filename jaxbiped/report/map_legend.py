@@ -1,4 +1,4 @@
-"""The legend of a map: what its colours, lines and signs mean."""
+"""The legend of a map: what its colours, lines and symbols mean."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ def draw_legend(
     """Rows under the figure that say what colours and lines mean.
 
     Args:
-      plan, track, truth, landmarks: what is drawn.
-      circle: [m] radius of that around the goal; None: there is none.
-      grown: whether obstacles are those of the robot's centre, as on a map that a mission plans on.
+      plan, track, truth, landmarks: whether these are drawn.
+      circle: [m] radius of the circle around the goal; None: no circle.
+      grown: whether obstacles are grown for the robot's centre, as on a map that a mission plans on.
     """
     names = {cell: cell.name.lower() for cell in Cell} | ({Cell.OBSTACLE: GROWN} if grown else {})
     handles = [patches.Patch(fc=COLOURS[cell], ec="#888888", lw=0.6, label=names[cell]) for cell in Cell]

@@ -1,4 +1,4 @@
-"""Pictures of what was measured: the disparity, the 3D grid, and the 2D grid made of it."""
+"""Pictures of measurements: the disparity, the 3D grid, and the 2D grid made from it."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from jaxbiped.report.pictures import CENTIMETRES, COLOURS, INK, METRES, Axis, dr
 from jaxbiped.report.style import own_style
 
 LARGEST_IN_CENTIMETRES = 5.0  # [m] a map beyond this is drawn in metres
-MOST_FACES = 60_000  # of voxels that are drawn; beyond, eight voxels become one
+MOST_FACES = 60_000  # drawn voxel faces; beyond that, eight voxels are merged into one
 LOOK = np.array([0.62, 0.42, -0.66])  # direction of view of the 3D grid: from behind, from the right, and from above
-SHADES = (1.0, 0.72, 0.55)  # of faces that look up, back and right
+SHADES = (1.0, 0.72, 0.55)  # of the faces that point up, back and right
 
 
 @own_style()
 def save_disparity(
     path: str | Path, left: np.ndarray, value: Float32[np.ndarray, "H W"], valid: Bool[np.ndarray, "H W"]
 ) -> None:
-    """A PNG of the left picture and its disparity [px]; what is not measured is white."""
+    """A PNG of the left picture and its disparity [px]; unmeasured pixels are white."""
     height, width = value.shape
     figure = Figure(figsize=(11, 5.5 * height / width + 0.8), layout="constrained")
     first, second = figure.subplots(1, 2)
@@ -89,7 +89,7 @@ def voxel_figure(
 
 
 def matplotlib_scale(scale: Normalize):
-    """What a colour bar wants to know."""
+    """The object that a colour bar needs."""
     from matplotlib.cm import ScalarMappable
 
     return ScalarMappable(norm=scale, cmap="viridis")
@@ -104,7 +104,7 @@ def screen() -> Float[np.ndarray, "2 3"]:
 
 
 def exposed(occupied: Bool[np.ndarray, "H W Z"]) -> list[Bool[np.ndarray, "H W Z"]]:
-    """Voxels whose upper, back (-x) and right (-y) face has no voxel before it."""
+    """Voxels whose upper, back (-x) and right (-y) face has no voxel in front of it."""
     empty_after = np.pad(~occupied, ((1, 0), (1, 0), (0, 1)), constant_values=True)
     return [
         occupied & empty_after[1:, 1:, 1:],
@@ -114,14 +114,14 @@ def exposed(occupied: Bool[np.ndarray, "H W Z"]) -> list[Bool[np.ndarray, "H W Z
 
 
 def exposed_count(occupied: Bool[np.ndarray, "H W Z"]) -> int:
-    """Faces that would be drawn."""
+    """The number of faces to draw."""
     return sum(int(mask.sum()) for mask in exposed(occupied))
 
 
 def block_faces(
     occupied: Bool[np.ndarray, "H W Z"], pitch: float, level_height: float, lowest: int
 ) -> tuple[Float[np.ndarray, "F 4 3"], Float[np.ndarray, "F"], Float[np.ndarray, "F"]]:
-    """Corners [m], height [m] and shade of each face that is seen."""
+    """Corners [m], height [m] and shade of each visible face."""
     corners = (
         [(0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)],
         [(0, 0, 0), (0, 1, 0), (0, 1, 1), (0, 0, 1)],
@@ -139,7 +139,7 @@ def block_faces(
 
 
 def halved(occupied: Bool[np.ndarray, "H W Z"]) -> Bool[np.ndarray, "I J K"]:
-    """Eight voxels as one, occupied where any is."""
+    """Eight voxels merged into one, occupied if any of them is."""
     padded = np.pad(occupied, [(0, n % 2) for n in occupied.shape])
     h, w, z = (n // 2 for n in padded.shape)
     return padded.reshape(h, 2, w, 2, z, 2).any((1, 3, 5))

@@ -1,4 +1,4 @@
-"""What strategies are compared by, and how it is said."""
+"""The measures by which strategies are compared, and how they are presented."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from jaxbiped.statistics import Comparison
 
 @dataclass(frozen=True)
 class Measure:
-    """One thing that strategies are compared by, and how it is said."""
+    """One measure by which strategies are compared, and how it is presented."""
 
     name: str
-    unit: str  # for people
+    unit: str  # as displayed
     scale: float  # from SI to that unit
     digits: int
     more: str  # what a greater value means
@@ -35,8 +35,8 @@ MEASURES = (SUCCESS, DISTANCE, TIME)
 
 
 def metric_measure(name: str, shown: Mapping[str, MetricFormat] = MappingProxyType({})) -> Measure:
-    """How the metric of a column is said: as was stored with its numbers, else as it says itself where it is registered
-    here. Nothing is imported: of one that is neither, numbers are shown as they are, and which are better is not said.
+    """How the metric of a column is presented: as stored with its numbers, else as it declares if registered here.
+    Nothing is imported: otherwise its numbers are shown as they are, without saying which are better.
     """
     from jaxbiped.core.registry import METRICS
     from jaxbiped.mission import metrics  # noqa: F401  registers those that are built in
@@ -48,5 +48,5 @@ def metric_measure(name: str, shown: Mapping[str, MetricFormat] = MappingProxyTy
 
 
 def metric_measures(comparison: Comparison) -> tuple[Measure, ...]:
-    """Those that a comparison has beside success, distance and time."""
+    """The measures of a comparison other than success, distance and time."""
     return tuple(metric_measure(name, comparison.shown) for name in comparison.metrics)

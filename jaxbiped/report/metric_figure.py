@@ -23,7 +23,7 @@ RESAMPLES = 999
 
 
 def own_estimate(rows: pl.DataFrame, metric: str, seed: int = 0) -> Estimate:
-    """A metric of one strategy's rows with its interval: a rate with Wilson's, a mean over reached missions with BCa's.
+    """A metric of one strategy's rows with its interval: Wilson's for a rate, BCa's for a mean over reached missions.
 
     Means of different strategies are over different missions: those that each of them solved.
     """
@@ -43,9 +43,9 @@ def own_metric(
     """The figure.
 
     Args:
-      points: as `store.read_points` gives them, with one swept field at most.
+      points: as returned by `store.read_points`, with at most one swept field.
       size: [inch] width and height.
-      shown: how numbers of metrics are shown, as a manifest says.
+      shown: how numbers of metrics are displayed, from the manifest.
     """
     measure = next((item for item in MEASURES if item.name == metric), None) or metric_measure(metric, shown)
     strategies, fields = ordered(rows["strategy"].unique()), [name for name in points.columns if name != "point"]
@@ -56,7 +56,7 @@ def own_metric(
         found = []
         for place, point in zip(places, points["point"], strict=True):
             value = own_estimate(rows.filter((pl.col("strategy") == name) & (pl.col("point") == point)), metric)
-            if value.valid and value.low is None:  # too few or too equal for an interval
+            if value.valid and value.low is None:  # too few or too similar for an interval
                 value = replace(value, low=value.estimate, high=value.estimate)
             if value.valid:
                 found.append((float(place + shift), value))

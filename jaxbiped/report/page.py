@@ -1,4 +1,4 @@
-"""The report as one HTML page that needs nothing else: no network, no script, all figures inside."""
+"""The report as one self-contained HTML page: no network, no script, all figures inside."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Key:
     name: str
     value: str
     limits: str
-    shown: bool  # a difference is
+    shown: bool  # whether a difference is shown
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,12 @@ class Section:
     text: tuple[str, ...] = ()
     plots: tuple[Plot, ...] = ()
     grids: tuple[Grid, ...] = ()
-    kind: str = ""  # "wide": figures below each other; "pairs": two and two
+    kind: str = ""  # "wide": figures below each other; "pairs": two side by side
 
 
 @dataclass(frozen=True)
 class Page:
-    """Everything that the page says, in its order."""
+    """Everything on the page, in order."""
 
     title: str
     kicker: str
@@ -67,7 +67,7 @@ class Page:
 
 
 def render(page: Page) -> str:
-    """The page as HTML; the same page gives the same text. Whatever a page says is escaped, but for its figures."""
+    """The page as HTML; the same page gives the same text. Everything on a page is escaped, except its figures."""
     return template().render(page=page, css=resources.files("jaxbiped.report").joinpath("page.css").read_text())
 
 
@@ -91,7 +91,7 @@ def keys(comparison: Comparison) -> tuple[Key, ...]:
         value, _ = part(pair, measure)
         if not value.valid:
             continue
-        limits = "too few arenas, or too equal, for an interval"
+        limits = "too few arenas, or too similar, for an interval"
         if value.low is not None:
             low, high = (typeset(signed(limit * measure.scale, measure.digits)) for limit in (value.low, value.high))
             limits = f"{low} to {high}, on {value.n:,} arenas"
@@ -102,7 +102,7 @@ def keys(comparison: Comparison) -> tuple[Key, ...]:
 
 
 def sections(frame: pl.DataFrame, comparison: Comparison) -> tuple[Section, ...]:
-    """Strategies, the pair, its strata, and what became of the missions.
+    """The strategies, the pair, its strata, and how the missions ended.
 
     Args:
       frame: the rows that `comparison` was made from.
@@ -141,7 +141,7 @@ def facts(comparison: Comparison, manifest: Manifest) -> dict[str, str]:
         "Seed": str(manifest.seed),
         "Config hash": manifest.config_hash,
         "Started": manifest.started,
-        "Wall time": f"{number(manifest.wall_time, 1)} s{speed}, of it compiling {number(manifest.compile_time, 1)} s",
+        "Wall time": f"{number(manifest.wall_time, 1)} s{speed}; compilation {number(manifest.compile_time, 1)} s",
         "Device": manifest.device,
         "Versions": versions,
         "Bootstraps": f"{comparison.resamples} resamples, seed {comparison.seed}",
@@ -162,10 +162,10 @@ def page_of(
     """The page of one comparison.
 
     Args:
-      frame: the rows that it was made from.
-      commands: that made it.
+      frame: the rows that the comparison was made from.
+      commands: the commands that made it.
       more: sections between the tables and the limitations.
-      warnings: what to know before anything else.
+      warnings: what to read first.
     """
     arenas = comparison.summary(comparison.strategies[0]).n
     kicker = f"jaxbiped · {arenas:,} random arenas · seed {manifest.seed} · intervals at {100 * comparison.level:g} %"

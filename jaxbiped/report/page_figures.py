@@ -1,4 +1,4 @@
-"""Figures of the HTML page: each one as narrow as a telephone, so that they lie side by side on anything wider."""
+"""Figures of the HTML page: each as narrow as a phone screen, so that they lie side by side on anything wider."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from jaxbiped.statistics.schema import ordered_families
 WIDTH = 5.2  # [inch]
 NO_PLAN = "#BFC6CE"
 UNPLANNED = "no plan exists"
-ON_PALE, ON_COLOUR = "#222222", "#FEFEFE"  # letters on a bar, the same in the dark
+ON_PALE, ON_COLOUR = "#222222", "#FEFEFE"  # text on a bar, the same in dark mode
 
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure as it lies in the page."""
+    """A figure as placed on the page."""
 
     markup: str  # of an svg or img element
     caption: str
 
 
 def plots(frame: pl.DataFrame, comparison: Comparison) -> dict[str, list[Plot]]:
-    """The figures that the rows have data for, by the section of the page that they belong to.
+    """The figures that the rows have data for, by the section of the page they belong to.
 
     Args:
       frame: the rows that `comparison` was made from.
@@ -53,12 +53,12 @@ def plots(frame: pl.DataFrame, comparison: Comparison) -> dict[str, list[Plot]]:
                 caption = (
                     f"Difference in {measure.name}, {first} minus {second}, with its interval. Filled: shown after "
                 )
-                caption += "Holm’s correction. Cross: too few arenas, or too equal, for an interval."
+                caption += "Holm’s correction. Cross: too few arenas, or too similar, for an interval."
                 add("strata", f"forest-{measure.name}", forest(comparison, first, second, measure), caption)
             caption = "Time on each arena that both solved."
             add("pair", "times", times(frame, first, second, (WIDTH, WIDTH)), caption)
-        caption = "Where missions went: those without a plan would fail with perfect knowledge of the arena, too. "
-        caption += "All others but the reached were lost by sensing, planning on what was sensed, or walking."
+        caption = "How missions ended: those without a plan would also fail with perfect knowledge of the arena. "
+        caption += "The other failures come from sensing, from planning on what was sensed, or from walking."
         add("failures", "attribution", attribution(frame, comparison), caption)
     return result
 
@@ -111,7 +111,7 @@ def forest(comparison: Comparison, first: str, second: str, measure: Measure) ->
 
 
 def attribution(frame: pl.DataFrame, comparison: Comparison) -> Figure:
-    """Stacked bars, a strategy each: reached, without a plan, and how the others were lost."""
+    """Stacked bars, one per strategy: reached, without a plan, and how the others were lost."""
     names = comparison.strategies
     figure, ax = canvas(WIDTH, 1.5 + 0.4 * len(names), grid="x")
     left = np.zeros(len(names))
@@ -136,7 +136,7 @@ def attribution(frame: pl.DataFrame, comparison: Comparison) -> Figure:
 
 
 def attributed(frame: pl.DataFrame, names: Sequence[str]) -> dict[str, np.ndarray]:
-    """Missions by what became of them, a count for each strategy: together they are all."""
+    """Numbers of missions of each strategy by how they ended; together they are all missions."""
     wheres = {"reached": pl.col("success"), UNPLANNED: ~pl.col("success") & ~pl.col("reachable")}
     wheres |= {code: pl.col("reachable") & (pl.col("code") == code) for code in CODES[1:]}
     sides = [frame.filter(pl.col("strategy") == name) for name in names]
@@ -157,5 +157,5 @@ def attribution_sheet(frame: pl.DataFrame, first: str, second: str) -> Sheet:
     )
     notes = (f"Counts. “{UNPLANNED.capitalize()}”: none for this strategy with perfect knowledge, however it ended.",)
     return Sheet(
-        "What became of missions, by family", ("family", *(label.replace("_", " ") for label in seen)), groups, notes
+        "How missions ended, by family", ("family", *(label.replace("_", " ") for label in seen)), groups, notes
     )

@@ -33,9 +33,9 @@ from jaxbiped.report.palette import TRACK as TRACK
 from jaxbiped.report.style import own_style
 
 GOAL_RADIUS = 0.10  # [m] "reached" (paper, 3.1)
-MOST_CELLS_LINED = 6000  # beyond, cells are too small for lines around them and numbers in them
-MOST_SHADE = 0.55  # of opacity of the shadows of terrain
-MOST_ARROWS = 150  # beyond, a plan is a line
+MOST_CELLS_LINED = 6000  # beyond that, cells are too small for grid lines and numbers
+MOST_SHADE = 0.55  # opacity of terrain shadows
+MOST_ARROWS = 150  # beyond that, a plan is a line
 
 
 def class_image(classes: Int8[np.ndarray, "H W"], levels: Int8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
@@ -62,15 +62,15 @@ def draw_map(
     terrain: Ground | None = None,
     axis: Axis = CENTIMETRES,
 ) -> None:
-    """Draw a map and what happens on it into `ax`.
+    """Draw a map and a mission on it into `ax`.
 
     Args:
       ax: the axes to draw into.
       grid: the map.
-      plan_xy: [m] the path to go: arrows from point to point, a line when there are many.
+      plan_xy: [m] the planned path: arrows from point to point, or a line if there are many.
       track_xy: [m] the path walked.
-      start_xy, goal_xy: [m] a ring, and a cross with a broken circle of `goal_radius` [m] (None: no circle).
-      outlines, landmarks, terrain: the truth that the map is about.
+      start_xy, goal_xy: [m] a ring, and a cross with a dashed circle of `goal_radius` [m] (None: no circle).
+      outlines, landmarks, terrain: the truth behind the map.
       axis: the unit of the axes.
     """
     k = axis.per_metre
@@ -104,9 +104,9 @@ def draw_map(
 
 
 def hillshade(heights: Float[np.ndarray, "P Q"], pitch: float) -> Float[np.ndarray, "P Q"]:
-    """How bright a surface of such heights [m] is, 0 to 1, lit from the upper left; level ground is at 0.71.
+    """Brightness, 0 to 1, of a surface with such heights [m], lit from the upper left; level ground is at 0.71.
 
-    Where the slope is unknown, at holes, it is taken to be level.
+    Where the slope is unknown, at holes, it is assumed to be level.
     """
     slope_y, slope_x = (np.nan_to_num(slope) for slope in np.gradient(heights, pitch))
     light = np.array([-0.5, 0.5, math.sqrt(0.5)])
@@ -114,13 +114,13 @@ def hillshade(heights: Float[np.ndarray, "P Q"], pitch: float) -> Float[np.ndarr
 
 
 def turned(grid: ClassGrid, k: float) -> Affine2D:
-    """From the axes of a grid, in units of which a metre has `k`, to those of its frame, in which it may lie turned."""
+    """From the axes of a grid, with `k` units per metre, to those of its frame, in which it may be rotated."""
     x0, _, y0, _ = (value * k for value in grid.extent)
     return Affine2D().rotate_around(x0, y0, grid.yaw)
 
 
 def draw_lines(ax: Axes, grid: ClassGrid, k: float) -> None:
-    """Thin lines between cells."""
+    """Draw thin lines between cells."""
     rows, columns = grid.shape
     x0, x1, y0, y1 = (value * k for value in grid.extent)
     style = {"color": "#606060", "lw": 0.4, "alpha": 0.22, "zorder": 1, "transform": turned(grid, k) + ax.transData}
@@ -129,7 +129,7 @@ def draw_lines(ax: Axes, grid: ClassGrid, k: float) -> None:
 
 
 def draw_terrain(ax: Axes, terrain: Ground, k: float) -> None:
-    """Terrain as the shadows and lights of its slopes, over the map; holes are hatched."""
+    """Draw terrain over the map as shaded relief; holes are hatched."""
     rows, columns = terrain.heights.shape
     x, y = terrain.origin_xy
     extent = tuple(v * k for v in (x, x + (columns - 1) * terrain.pitch, y, y + (rows - 1) * terrain.pitch))
@@ -146,7 +146,7 @@ def draw_terrain(ax: Axes, terrain: Ground, k: float) -> None:
 
 
 def draw_levels(ax: Axes, grid: ClassGrid, k: float) -> None:
-    """The level in each bump cell."""
+    """Write the level into each bump cell."""
     bumps = np.argwhere(grid.classes == Cell.BUMP)
     style = {"color": "white", "size": 6, "ha": "center", "va": "center", "clip_on": True, "zorder": 2}
     for (i, j), (x, y) in zip(bumps, grid.centres_xy(bumps) * k, strict=True):
@@ -154,7 +154,7 @@ def draw_levels(ax: Axes, grid: ClassGrid, k: float) -> None:
 
 
 def draw_plan(ax: Axes, path: Float[np.ndarray, "n 2"]) -> None:
-    """A path in axis units: one arrow per step, or a line when there are too many to tell apart."""
+    """Draw a path in axis units: one arrow per step, or a line if there are too many to distinguish."""
     if len(path) <= MOST_ARROWS:
         (x, y), (u, v) = path[:-1].T, np.diff(path, axis=0).T
         options = {"headwidth": 4.5, "headlength": 5, "headaxislength": 4.5, "width": 0.004}
@@ -164,7 +164,7 @@ def draw_plan(ax: Axes, path: Float[np.ndarray, "n 2"]) -> None:
 
 
 def draw_goal(ax: Axes, goal_xy: tuple[float, float], radius: float | None, k: float) -> None:
-    """A cross, and around it the broken circle within which the goal counts as reached."""
+    """Draw a cross and a dashed circle around it, within which the goal counts as reached."""
     x, y = goal_xy[0] * k, goal_xy[1] * k
     ax.plot(x, y, "x", ms=9, mec=INK, mew=2.4, zorder=7)
     if radius is not None:
@@ -183,12 +183,12 @@ def mark_patch(mark: Mark, k: float) -> patches.Patch:
 
 
 def face(mark: Mark) -> dict[str, str]:
-    """Colours of a landmark's inside and rim."""
+    """Fill and edge colours of a landmark."""
     return {"fc": MARKS[mark.kind]["mfc"], "ec": MARKS[mark.kind]["mec"]}
 
 
 def frame(ax: Axes, extent: tuple[float, float, float, float], axis: Axis) -> None:
-    """Limits, labels and a thin border."""
+    """Set limits, labels and a thin border."""
     x0, x1, y0, y1 = extent
     ax.set(xlim=(x0, x1), ylim=(y1, y0) if axis.y_down else (y0, y1), aspect="equal")
     ax.set(xlabel=f"x [{axis.unit}]", ylabel=f"y [{axis.unit}]")
@@ -199,13 +199,13 @@ def frame(ax: Axes, extent: tuple[float, float, float, float], axis: Axis) -> No
 
 @own_style()
 def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
-    """Write `figure` as PNG, whole or not at all; raise `InputError` when that fails."""
+    """Write `figure` as PNG, whole or not at all; raise `InputError` if that fails."""
     write_whole(path, lambda file: figure.savefig(file, format="png", dpi=dpi, facecolor="white"))
 
 
 @own_style()
 def save_map(path: str | Path, grid: ClassGrid, *, title: str = "", **what) -> None:
-    """A PNG of one map; `what` goes to `draw_map`."""
+    """Write a PNG of one map; `what` is passed to `draw_map`."""
     rows, columns = grid.shape
     width = 7.0
     figure = Figure(figsize=(width, float(np.clip(width * rows / columns, 2.5, 10)) + 0.7), layout="constrained")
@@ -225,7 +225,7 @@ def moment(log: MissionLog, t: int) -> ClassGrid:
 
 @own_style()
 def save_mission(path: str | Path, log: MissionLog, *, title: str = "", panels: int = 4) -> None:
-    """A PNG of a mission: the map at up to `panels` moments, evenly spaced, the plan ahead and the track so far."""
+    """Write a PNG of a mission: the map at up to `panels` evenly spaced moments, the plan and the track so far."""
     moments = np.unique(np.linspace(0, len(log.time) - 1, panels).round().astype(int)).tolist()
     columns = min(2, len(moments))
     rows = math.ceil(len(moments) / columns)
@@ -253,12 +253,12 @@ def save_mission(path: str | Path, log: MissionLog, *, title: str = "", panels: 
 
 
 def mission_legend(figure: Figure, log: MissionLog) -> None:
-    """The legend of a mission's maps."""
+    """Draw the legend of a mission's maps."""
     what = {"truth": bool(log.outlines), "landmarks": log.landmarks, "circle": GOAL_RADIUS}
     draw_legend(figure, track=True, grown=True, **what)
 
 
 def caption(log: MissionLog, t: int) -> str:
-    """What was done last, and at the end how the mission ended."""
+    """What was done last and, at the end, how the mission ended."""
     last = t == len(log.time) - 1
     return f"{log.action[t]} ({log.outcome.replace('_', ' ')})" if last and log.outcome else log.action[t]

@@ -24,7 +24,7 @@ from jaxbiped.report.words import NONE, number, percent, signed
 from jaxbiped.statistics.intervals import proportion
 
 Tables = Mapping[str, PrimitiveTable]
-FACTORS = {  # disturbances by themselves: heading, unit, and the value of none
+FACTORS = {  # single disturbances: heading, unit, and the undisturbed value
     "friction": ("friction", 1.0, 0.8),
     "mass": ("mass", 1.0, 1.0),
     "slope": ("slope deg", math.radians(1.0), 0.0),
@@ -61,12 +61,12 @@ def of(rows: pl.DataFrame, name: str, chosen: str) -> pl.DataFrame:
 
 
 def title(name: str) -> str:
-    """A primitive's name for people."""
+    """A primitive's display name."""
     return name.replace("_", " ")
 
 
 def success_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
-    """How often each primitive succeeds, and how the others end."""
+    """How often each primitive succeeds, and how the other trials end."""
     lines = []
     for name, table in tables.items():
         line = [title(name), f"{table.duration:g}"]
@@ -94,13 +94,13 @@ def displacement_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
         line = [title(name), number(1e3 * off, 2), signed(math.degrees(nominal["error_yaw"]), 2)]
         line += [f"{signed(u * m, 2)} ± {number(u * s, 2)}" for m, s, u in zip(mean, sd, units, strict=True)]
         lines.append(tuple(line))
-    columns = ("primitive", "off mm", "yaw deg", "mild: ahead mm", "left mm", "yaw deg")
-    return Sheet("Displacement, less what was asked for", columns, (tuple(lines),),
+    columns = ("primitive", "error mm", "yaw deg", "mild: ahead mm", "left mm", "yaw deg")
+    return Sheet("Displacement minus the requested displacement", columns, (tuple(lines),),
                  ("Undisturbed; then mean and standard deviation on the mild set.",))  # fmt: skip
 
 
 def load_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
-    """What each primitive takes, at worst on the mild set; energy and height undisturbed."""
+    """What each primitive requires: the worst values on the mild set; energy and height undisturbed."""
     lines = []
     for name in tables:
         nominal, mild = of(rows, name, "nominal").row(0, named=True), of(rows, name, "mild")
@@ -119,10 +119,10 @@ def load_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
         ))  # fmt: skip
     columns = ("primitive", "slip mm", "mild", "ZMP mm", "mild", "Nm", "deg/s", "J", "head cm", "sway cm")
     notes = (
-        "Slip, and the zero moment point's least margin, undisturbed and at worst on the mild set; torque, speed and "
-        "sway at worst on the mild set; energy and the head's clearance under the lintel undisturbed.",
+        "Slip and the smallest zero moment point margin, undisturbed and worst on the mild set; torque, speed and "
+        "sway, worst on the mild set; energy and the head's clearance under the lintel, undisturbed.",
     )
-    return Sheet("What it takes", columns, (tuple(lines),), notes)
+    return Sheet("Requirements", columns, (tuple(lines),), notes)
 
 
 def covariance_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
@@ -139,7 +139,7 @@ def covariance_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
 
 
 def limit_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
-    """What each primitive bears of each disturbance by itself."""
+    """How much of each disturbance alone each primitive tolerates."""
     servo = sorted({s for s in rows["set"].unique() if s.startswith("servo")})
     lines = []
     for name in tables:
@@ -152,14 +152,14 @@ def limit_sheet(rows: pl.DataFrame, tables: Tables) -> Sheet:
         lines.append(tuple(line))
     columns = ("primitive", *(heading for heading, _, _ in FACTORS.values()), *(f"{s} deg" for s in servo))
     notes = (
-        "The values between which all that were tried succeeded; ≤ and ≥ where the outermost tried still did.",
-        "Servo: normal zero offsets of all servos with this standard deviation.",
+        "The range in which all tried values succeeded; ≤ and ≥ where even the outermost one did.",
+        "Servo: normally distributed zero offsets of all servos with this standard deviation.",
     )
-    return Sheet("What is borne, one disturbance at a time", columns, (tuple(lines),), notes)
+    return Sheet("Tolerated range of each disturbance alone", columns, (tuple(lines),), notes)
 
 
 def borne(rows: pl.DataFrame, factor: str, unit: float, none: float) -> str:
-    """From which to which value every trial succeeded, as in "-12 to 8"."""
+    """The range of values over which every trial succeeded, as in "-12 to 8"."""
     if rows.is_empty():
         return NONE
     values, success = rows[factor].to_numpy(), rows["success"].to_numpy()
@@ -176,7 +176,7 @@ def borne(rows: pl.DataFrame, factor: str, unit: float, none: float) -> str:
 
 @own_style()
 def save_windows(path: Path, made: LibraryConfig) -> bool:
-    """Draw how steps end by distance and yaw of their edge; whether there were any."""
+    """Draw how steps end by distance and yaw of their edge; return whether there were any."""
     windows = {name: one.window for name, one in made.primitives.items() if one.window is not None}
     if not windows:
         return False
@@ -189,7 +189,7 @@ def save_windows(path: Path, made: LibraryConfig) -> bool:
                               vmin=0, vmax=1, shading="nearest", edgecolors="white", linewidth=0.4)  # fmt: skip
         shown.set_rasterized(True)
         ax.plot(0, 0, "+", color="#1e222a", ms=9)
-        ax.set(title=title(name), xlabel="edge turned by [deg]", ylabel="edge further away by [mm]")
+        ax.set(title=title(name), xlabel="edge turned by [deg]", ylabel="edge farther away by [mm]")
     figure.suptitle("Green: ends upright on both feet. Red: falls, or stands on the edge.", fontsize=9)
     canvas.draw()
     write_whole(path, lambda file: figure.savefig(file, format="png"))
@@ -209,14 +209,14 @@ def markdown(rows: pl.DataFrame, tables: Tables, manifest: dict, windows: bool, 
         "### How it was made",
         "",
         f"- Command: `{manifest['command']}`",
-        f"- Success: the middle between the feet within {1e3 * tolerance['placement']:g} mm, the yaw within "
+        f"- Success: the midpoint between the feet within {1e3 * tolerance['placement']:g} mm, the yaw within "
         f"{math.degrees(tolerance['yaw']):g} degrees, both soles within {1e3 * tolerance['height']:g} mm of their "
         f"ground, the torso within {math.degrees(tolerance['upright']):g} degrees of upright, and nothing touched by "
         "head or torso.",
-        "- Falls are trials that end otherwise than upright on the ground that they should stand on; slips end upright "
-        "elsewhere than they should.",
+        "- Falls are trials that do not end upright on the ground that they should stand on; slips end upright "
+        "in another place than intended.",
         *(f"- Set `{name}`: `{json.dumps(chosen)}`" for name, chosen in manifest["sets"].items()),
-        f"- {len(rows)} trials, `trials.parquet`, one row each; `library.toml` is what `--executor sampled` reads.",
+        f"- {len(rows)} trials, `trials.parquet`, one row each; `--executor sampled` reads `library.toml`.",
         f"- Versions: {', '.join(f'{name} {version}' for name, version in manifest['versions'].items())}",
         "",
     ]

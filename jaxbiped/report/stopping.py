@@ -1,4 +1,4 @@
-"""How the watching of a difference ended, in words."""
+"""How watching a difference ended, in words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from jaxbiped.study.stopping import read_stopping
 
 
 def stopping_sentences(folder: str | Path) -> tuple[str, ...]:
-    """How many arenas were used and which left out, and what the interval means; none where nothing was watched."""
+    """How many arenas were used and left out, and what the interval means; empty if nothing was watched."""
     found = read_stopping(folder)
     if found is None:
         return ()
@@ -20,7 +20,7 @@ def stopping_sentences(folder: str | Path) -> tuple[str, ...]:
     start = "Stopped after" if found.reached else "Not stopped: all of"
     used = f"{start} {found.arenas:,} of at most {found.most:,} arenas and {looks}"
     if found.low is None:
-        return (f"{used}; too few arenas, or too equal, for an interval of the difference in {measure.name}.",)
+        return (f"{used}; too few arenas, or too similar, for an interval of the difference in {measure.name}.",)
     limits = [signed(value * measure.scale, measure.digits) for value in (found.low, found.high)]
     wide = f"{(found.high - found.low) * measure.scale:.{measure.digits}f} wide"
     what = (
@@ -29,4 +29,4 @@ def stopping_sentences(folder: str | Path) -> tuple[str, ...]:
     left = f" {found.most - found.arenas:,} arenas were left out." if found.arenas < found.most else ""
     sure = f"This interval holds at all looks at once with {100 * found.level:g} % (confidence sequence, on"
     sure += f" {found.samples:,} arenas); intervals and p-values elsewhere are those of a fixed number of arenas."
-    return (f"{used}: {what}, {wide}, where {asked} was asked for.{left} {sure}",)
+    return (f"{used}: {what}, {wide}, where {asked} was requested.{left} {sure}",)

@@ -1,4 +1,4 @@
-"""What is said about two stored sides: their tables, whether they are equivalent, and how many arenas more to take."""
+"""The report on two stored sides: their tables, whether they are equivalent, and how many more arenas to take."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ def written_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
 
 
 def others(comparison: Comparison) -> tuple[Sheet, ...]:
-    """The table of metrics beside success, distance and time, where there are any."""
+    """The table of metrics other than success, distance and time, if there are any."""
     return (metric_sheet(comparison, *comparison.question),) if comparison.metrics else ()
 
 
 def equivalence_sheets(found: Sequence[Equivalence]) -> tuple[Sheet, ...]:
-    """A table for each measure that was tested: a row for each stratum."""
+    """A table for each measure that was tested, with a row for each stratum."""
     measures = dict.fromkeys(item.measure for item in found)
     return tuple(
         equivalence_sheet([item for item in found if item.measure == name], BY_NAME[name]) for name in measures
@@ -57,7 +57,7 @@ def equivalence_sheets(found: Sequence[Equivalence]) -> tuple[Sheet, ...]:
 
 
 def equivalence_sheet(found: Sequence[Equivalence], measure: Measure) -> Sheet:
-    """Of one measure."""
+    """The equivalence table of one measure."""
     groups: dict[str, list[tuple[str, ...]]] = {}
     for item in found:
         value = item.difference
@@ -71,25 +71,27 @@ def equivalence_sheet(found: Sequence[Equivalence], measure: Measure) -> Sheet:
     columns = ("stratum", "arenas", "difference", f"{100 * (1 - 2 * alpha):g} % interval", "p (Holm)", "within")
     test = "score tests (Tango)" if measure.name == "success" else "t tests (Schuirmann), on arenas that both solved"
     notes = (
-        f"Two one-sided {test}: within, where the difference is shown to be less than the margin (p < {alpha:g}).",
-        "No test on fewer than two arenas, nor on arenas that are all alike.",
+        f"Two one-sided {test}: within, if the difference is shown to be less than the margin (p < {alpha:g}).",
+        "No test on fewer than two arenas, or if all arenas give the same difference.",
     )
     title = f"Equivalence in {measure.name}, margin {margin:g} {measure.unit}"
     return Sheet(title, columns, tuple(tuple(rows) for rows in groups.values()), notes)
 
 
 def plan_sentences(plan: Plan, first: str, second: str) -> tuple[str, ...]:
-    """How many arenas, on what it rests, and how sure that is."""
+    """How many arenas, the basis of that number, and its uncertainty."""
     measure = BY_NAME[plan.measure]
     wanted = f"{plan.wanted * measure.scale:g} {measure.unit}"
     start = f"{plan.arenas:,} arenas would show a difference of {wanted} in {measure.name} between {first} and {second}"
     start += f" with a power of {100 * plan.power:g} %, at {100 * (1 - plan.alpha):g} %."
     if measure.name == "success":
-        basis = f"In the pilot of {plan.pilot:,} arenas one alone solved {percent(plan.spread)} % of them (McNemar)."
-        high = f"Were it {percent(plan.spread_high)} %, the upper end of the 95 % interval"
+        basis = (
+            f"In the pilot of {plan.pilot:,} arenas {percent(plan.spread)} % were solved by one side only (McNemar)."
+        )
+        high = f"If it were {percent(plan.spread_high)} %, the upper end of the 95 % interval"
     else:
         spread, upper = (f"{value * measure.scale:.{measure.digits}f}" for value in (plan.spread, plan.spread_high))
         basis = f"In the pilot both solved {plan.solved:,} of {plan.pilot:,} arenas; their differences have a standard"
         basis += f" deviation of {spread} {measure.unit} (paired t test)."
-        high = f"Were it {upper} {measure.unit}, the upper end of the 95 % interval"
+        high = f"If it were {upper} {measure.unit}, the upper end of the 95 % interval"
     return start, basis, f"{high}, {plan.arenas_high:,} would."

@@ -1,4 +1,4 @@
-"""How figures look: as matplotlib comes, whatever the user's matplotlibrc says of fonts, TeX, sizes and colours."""
+"""The style of figures: matplotlib's defaults, whatever the user's matplotlibrc sets for fonts, sizes and colours."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from typing import Any
 
 import matplotlib
 
-OF_WINDOWS = ("backend", "backend_fallback", "interactive", "toolbar")  # which our figures do not have
+OF_WINDOWS = ("backend", "backend_fallback", "interactive", "toolbar")  # which do not concern our figures
 PLAIN = {name: matplotlib.rcParamsDefault[name] for name in matplotlib.rcParamsDefault if name not in OF_WINDOWS}
 INSIDE: ContextVar[bool] = ContextVar("inside", default=False)
 
 
 @contextmanager
 def own_style(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Figures are made, and saved, in this context; also a decorator (`@own_style()`).
+    """Context in which figures are made and saved; also a decorator (`@own_style()`).
 
-    Inside another one it changes only what `changes` says, so that a page can have its own colours.
+    Nested in another one it changes only `changes`, so that a page can have its own colours.
 
     Args:
-      changes: of matplotlib's parameters.
+      changes: matplotlib parameters.
     """
     base = {} if INSIDE.get() else PLAIN
     token = INSIDE.set(True)

@@ -1,4 +1,4 @@
-"""Matplotlib figures as SVG that lies inside an HTML page and takes its colours and its letters from it."""
+"""Matplotlib figures as SVG inside an HTML page, with colours and fonts taken from the page."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from matplotlib.figure import Figure
 
 from jaxbiped.report.style import own_style
 
-# What a figure is drawn in, and the variable of the page that stands for it there.
+# Colours in which a figure is drawn, and the variables of the page that replace them.
 VARIABLES = {"#333333": "--ink", "#dddddd": "--line", "#f6f6f6": "--band", "#ffffff": "--paper"}
 INK, LINE, PAPER = "#333333", "#DDDDDD", "#FFFFFF"
-PIXELS_PER_UNIT = 1.4  # at most: a figure is not blown up beyond its letters being as large as the page's
+PIXELS_PER_UNIT = 1.4  # at most: a figure is not enlarged beyond the page's font size
 
 
 @contextmanager
 def themed() -> Iterator[None]:
-    """Figures that are made in this context are drawn in the colours that `inline` knows."""
+    """Figures made in this context are drawn in the colours that `inline` knows."""
     ink = dict.fromkeys(("text.color", "axes.edgecolor", "axes.labelcolor", "xtick.color", "ytick.color"), INK)
     looks = {"font.size": 9, "axes.titlesize": 10, "axes.titleweight": "bold", "figure.facecolor": "none"}
     with own_style(ink | looks | {"axes.facecolor": "none", "axes.labelsize": 9}):
@@ -32,7 +32,7 @@ def inline(figure: Figure, name: str, description: str) -> str:
 
     Args:
       name: distinct in the page; keeps the names inside the figures apart.
-      description: what a reader hears who does not see it.
+      description: the text for screen readers.
     """
     buffer = io.StringIO()
     options = {"svg.fonttype": "none", "svg.hashsalt": name}

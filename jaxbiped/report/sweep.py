@@ -1,4 +1,4 @@
-"""The report of a sweep: tables, a figure and `summary.md`, written anew from its rows."""
+"""The report of a sweep: tables, a figure and `summary.md`, rewritten from its rows."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ SUMMARY, FIGURE = "summary.md", "sweep.png"
 ROWS = 24  # of a table on a terminal
 
 LIMITATIONS = (
-    "Intervals are of one sweep point each, at the level that is said; none is corrected for their number. The best of "
+    "Each interval is for one sweep point, at the stated level, without correction for their number. The best of "
     "many points looks better than it is.",
     "Distance and time are compared on arenas that both sides solved, the easier ones.",
-    "All points have the same arenas and the same noise seeds, so that differences between points are paired as well.",
+    "All points have the same arenas and the same noise seeds, so differences between points are paired as well.",
 )
 
 
 @dataclass(frozen=True)
 class SweepReport:
-    """What a report of a sweep is made of."""
+    """The parts of a sweep's report."""
 
     folder: Path
     result: SweepResult
@@ -67,7 +67,7 @@ def write_sweep_report(folder: str | Path, *, resamples: int = 999) -> SweepRepo
 
 
 def grid_axes(manifest: Manifest) -> tuple[str, ...]:
-    """The field of each axis that has more than one value; none where there are Sobol points."""
+    """The field of each axis that has more than one value; none if there are Sobol points."""
     if manifest.config.get("sobol"):
         return ()
     axes = manifest.config.get("axes", ())
@@ -81,7 +81,7 @@ def changed_together(manifest: Manifest) -> dict[str, tuple[str, ...]]:
 
 
 def terminal(report: SweepReport) -> Group:
-    """What a sweep prints."""
+    """The output of a sweep on the terminal."""
     blocks = []
     for sheet in report.sheets:
         rows = sheet.groups[0]
@@ -116,7 +116,7 @@ def sheets(result: SweepResult) -> tuple[Sheet, ...]:
 
 
 def ending_sheet(frame: pl.DataFrame, strategies: Sequence[str]) -> Sheet:
-    """How the missions of each strategy ended, of all points together; codes that never came are left out."""
+    """How the missions of each strategy ended, over all points; codes that never occurred are left out."""
     counts = dict(frame.group_by(pl.col("strategy", "code").cast(pl.String)).len().rows_by_key(["strategy", "code"]))
     number_of = {key: found[0][-1] for key, found in counts.items()}
     seen = [code for code in CODES if any((name, code) in number_of for name in strategies)]
@@ -128,7 +128,7 @@ def ending_sheet(frame: pl.DataFrame, strategies: Sequence[str]) -> Sheet:
 def sheet(
     title: str, result: SweepResult, columns: dict[str, Callable[[PointResult], str]], notes: tuple[str, ...]
 ) -> Sheet:
-    """A row for each sweep point: its values, then what `columns` say of it."""
+    """A row for each sweep point: its values, then the cells of `columns`."""
     rows = [
         (
             str(point.index),
@@ -141,13 +141,13 @@ def sheet(
 
 
 def short(fields: Sequence[str]) -> tuple[str, ...]:
-    """The last words of dotted names, where those are all different."""
+    """The last parts of dotted names, if those are all different."""
     last = tuple(name.rpartition(".")[2] for name in fields)
     return last if len(set(last)) == len(last) else tuple(fields)
 
 
 def titled(measure: Measure) -> str:
-    """The head of a column."""
+    """The heading of a column."""
     return f"{measure.name}, {measure.unit}"
 
 
@@ -178,7 +178,7 @@ def summary(manifest: Manifest, tables: tuple[Sheet, ...], said: tuple[str, ...]
             f"- Wall time: {number(manifest.wall_time, 1)} s; compilation: {number(manifest.compile_time, 1)} s",
             f"- Device: {manifest.device}",
             f"- Versions: {versions}",
-            "- Rows: `rows/*.parquet`, a row a mission; `points.parquet`: the sweep points",
+            "- Rows: `rows/*.parquet`, one row per mission; `points.parquet`: the sweep points",
             "",
         ]
     )

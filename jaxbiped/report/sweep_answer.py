@@ -1,4 +1,4 @@
-"""What a sweep says in sentences: where one strategy is ahead of another, and which axes change nothing."""
+"""The findings of a sweep in sentences: where one strategy is ahead of another, and which axes change nothing."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxbiped.statistics.sweep_points import PointResult, SweepResult
 
 
 def sentences(result: SweepResult, idle: Sequence[IdleSpan] = ()) -> tuple[str, ...]:
-    """At how many points the first of the question's pair is ahead, and where most; then what changes nothing."""
+    """At how many points the first of the question's pair is ahead, and where by most; then what changes nothing."""
     said = []
     if result.question is not None:
         said = [measure_sentence(result, measure, *result.question) for measure in MEASURES]
@@ -20,7 +20,7 @@ def sentences(result: SweepResult, idle: Sequence[IdleSpan] = ()) -> tuple[str, 
 
 
 def measure_sentence(result: SweepResult, measure: Measure, first: str, second: str) -> str:
-    """In one measure: at how many points which of two strategies is ahead, and where by most."""
+    """For one measure: at how many points which of two strategies is ahead, and where by most."""
     found = [(point, part(point.pair, measure)[0]) for point in result.points if point.pair]
     known = [(point, value) for point, value in found if value.valid and value.low is not None]
     sign = -1 if measure.smaller_is_better else 1
@@ -46,18 +46,18 @@ def measure_sentence(result: SweepResult, measure: Measure, first: str, second: 
 
 
 def any_of(count: int) -> str:
-    """Points in a negation."""
+    """The points, in a negation."""
     return "the only point" if count == 1 else f"any of the {count} points"
 
 
 def every_one_of(count: int) -> str:
-    """All points."""
+    """The points, all of them."""
     return "the only point" if count == 1 else "both points" if count == 2 else f"all {count} points"
 
 
 def without_interval(count: int) -> str:
-    """What is said of points whose difference has no interval."""
-    return f"At {count} too few arenas were solved, or all are alike, so that there is no interval." if count else ""
+    """The sentence about points whose difference has no interval."""
+    return f"At {count} there is no interval: too few arenas were solved, or all are alike." if count else ""
 
 
 def most(
@@ -66,7 +66,7 @@ def most(
     sign: int,
     measure: Measure,
 ) -> str:
-    """Where the first strategy is furthest ahead or, where it never is, furthest behind."""
+    """Where the first strategy is ahead by most or, if it never is, behind by most."""
     items, word = (ahead, "lead") if ahead else (behind, "deficit")
     point, _ = max(items, key=lambda item: abs(item[1].estimate))
     at = listed([f"{name} = {value:.4g}" for name, value in point.values.items()])
@@ -74,7 +74,7 @@ def most(
 
 
 def idle_sentence(span: IdleSpan) -> str:
-    """What is said of a stretch of an axis that changes nothing."""
+    """The sentence about a range of an axis that changes nothing."""
     if span.whole:
         return f"{span.field} changes nothing: every mission is the same at all {span.values} values."
     where = f"from {span.low:.4g} to {span.high:.4g}"

@@ -1,4 +1,4 @@
-"""Figures of a sweep: a line over one axis, a heat map over two, dots over each field otherwise."""
+"""Figures of a sweep: a line over one axis, a heat map over two, otherwise dots over each field."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from jaxbiped.report.style import own_style
 from jaxbiped.statistics import Estimate
 from jaxbiped.statistics.sweep_points import PointResult, SweepResult
 
-RATIO = 8.0  # greatest over least value from which an axis is drawn on a log scale
+RATIO = 8.0  # ratio of greatest to least value above which an axis is logarithmic
 BETTER_UP, BETTER_DOWN = "RdBu", "RdBu_r"  # around zero: blue where the first strategy is better
 RISING = "Blues"
-DARK, PALE = "#222222", "#FEFEFE"  # on colours, which stay as they are where a page is dark
-PALER = 1.3  # the greatest difference is this much short of the darkest colour
+DARK, PALE = "#222222", "#FEFEFE"  # text on colours, which stay the same in dark mode
+PALER = 1.3  # by this factor the greatest difference is paler than the darkest colour
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One quantity of a sweep, of which each point has an estimate."""
+    """One quantity of a sweep, with an estimate for each point."""
 
     title: str
     scale: float
     digits: int
-    signed: bool  # a difference, that is read against zero
+    signed: bool  # a difference, read against zero
     colours: str
 
     def of(self, point: PointResult) -> Estimate | None:
@@ -49,7 +49,7 @@ class Rate(Panel):
 
 @dataclass(frozen=True)
 class Difference(Panel):
-    """The question's pair in one measure."""
+    """The question's pair, in one measure."""
 
     measure: Measure = SUCCESS
 
@@ -58,7 +58,7 @@ class Difference(Panel):
 
 
 def difference_panels(result: SweepResult, measures: Sequence[Measure] = MEASURES) -> list[Panel]:
-    """The pair of the question, a panel for each measure."""
+    """The question's pair, with a panel for each measure."""
     if result.question is None:
         return []
     first, second = result.question
@@ -76,7 +76,7 @@ def difference_panels(result: SweepResult, measures: Sequence[Measure] = MEASURE
 
 
 def rate_panels(result: SweepResult) -> list[Panel]:
-    """Success, a panel for each strategy."""
+    """Success, with a panel for each strategy."""
     return [Rate(f"{name}:\nsuccess [%]", 100.0, 0, False, RISING, name) for name in result.strategies]
 
 
@@ -84,14 +84,14 @@ def sweep_figure(result: SweepResult, axes: Sequence[str]) -> tuple[Figure, str]
     """The figure that fits a sweep, and its caption.
 
     Args:
-      axes: the field of each axis; none where the points lie on no grid.
+      axes: the field of each axis; empty if the points lie on no grid.
     """
     if len(axes) == 1:
         return line(result, axes[0]), f"Against {axes[0]}, with intervals at {100 * result.level:g} %."
     if len(axes) == 2:
         caption = "Success of each strategy."
         if result.question:
-            caption = f"Blue: {result.question[0]} is better. Framed: the interval leaves zero out."
+            caption = f"Blue: {result.question[0]} is better. Framed: the interval excludes zero."
         return heat_map(result, *axes), caption
     return dots(result), "Each dot is a sweep point, drawn over each of the swept fields."
 
@@ -145,7 +145,7 @@ def heat_map(result: SweepResult, field_y: str, field_x: str, panels: Sequence[P
 
 
 def fill_map(ax: Axes, values: np.ndarray, shown: np.ndarray, panel: Panel) -> None:
-    """Colours and numbers of one map [rows from below]; `shown` cells are framed."""
+    """Draw colours and numbers of one map [rows from below]; `shown` cells are framed."""
     most = PALER * np.nanmax(np.abs(values), initial=1e-9)
     limits = {"vmin": -most, "vmax": most} if panel.signed else {"vmin": 0, "vmax": 100}
     image = ax.imshow(values, origin="lower", aspect="auto", cmap=panel.colours, **limits)
@@ -164,7 +164,7 @@ def fill_map(ax: Axes, values: np.ndarray, shown: np.ndarray, panel: Panel) -> N
 
 @own_style()
 def dots(result: SweepResult) -> Figure:
-    """A column for each field, a row for success and one for the question's pair in time."""
+    """A column for each field, with a row for success and one for the time of the question's pair."""
     fields, panels = result.fields, [None, *difference_panels(result, (TIME,))]
     figure = Figure(figsize=(2.6 * len(fields) + 0.6, 2.4 * len(panels) + 0.5), layout="constrained")
     grid = np.asarray(figure.subplots(len(panels), len(fields), sharey="row", squeeze=False))
@@ -193,7 +193,7 @@ def dots(result: SweepResult) -> Figure:
 
 
 def scale_x(ax: Axes, values: Sequence[float]) -> None:
-    """A log scale for values over a wide range, and ticks at the values where they are few."""
+    """Set a log scale for values over a wide range, and ticks at the values if they are few."""
     different = sorted(set(values))
     if different[0] > 0 and different[-1] / different[0] >= RATIO:
         ax.set_xscale("log")
@@ -203,5 +203,5 @@ def scale_x(ax: Axes, values: Sequence[float]) -> None:
 
 
 def rounded(values: Sequence[float]) -> list[float]:
-    """Values with three digits, as people read them."""
+    """Values rounded to three digits."""
     return [float(f"{value:.3g}") for value in values]

@@ -26,7 +26,7 @@ from jaxbiped.statistics import compare
 from jaxbiped.statistics.sweep_points import PointResult, SweepResult
 from jaxbiped.study import read
 
-MOST_ROWS = 256  # of a table: beyond, the page says where the others are
+MOST_ROWS = 256  # in a table; for more rows the page says where to find them
 
 
 def write_sweep_page(
@@ -35,10 +35,10 @@ def write_sweep_page(
     """Write `report.html` into a sweep's folder.
 
     Args:
-      report: of the sweep.
-      point: at which strategies are compared in full; by default that with the config's own values, else the first.
-      resamples: of the bootstraps at that point.
-      examples: arenas to be played again and drawn there, see `folder_report.write_report`.
+      report: report of the sweep.
+      point: where strategies are compared in full; by default that with the config's own values, else the first.
+      resamples: resamples of the bootstraps at that point.
+      examples: arenas to be replayed and drawn there, see `folder_report.write_report`.
 
     Raises:
       InputError: a point that has no rows, or a file that cannot be written.
@@ -64,14 +64,14 @@ def write_sweep_page(
     )
     kicker = f"jaxbiped · {len(result.points):,} sweep points · {page.kicker.partition(' · ')[2]}"
     at = f"At point {point}: {listed([f'{name} {value:g}' for name, value in chosen.values.items()])}"
-    text = "From here on all is about this one point; the option --point of jaxbiped report chooses another."
+    text = "Everything below is about this point; the option --point of jaxbiped report chooses another."
     page = replace(
         page,
         kicker=kicker,
         answer=tuple(typeset(sentence) for sentence in report.sentences),
         keys=(),
         sections=(over(report, rows), Section(at, (text,)), *page.sections),
-        warnings=() if manifest.state == "finished" else ("This sweep is not finished: points lack arenas.",),
+        warnings=() if manifest.state == "finished" else ("This sweep is not finished: some arenas are missing.",),
     )
     path = folder / PAGE
     write_whole(path, lambda file: file.write(render(page).encode()))
@@ -79,13 +79,13 @@ def write_sweep_page(
 
 
 def title(report: SweepReport) -> str:
-    """The sweep's own question, or what it asks by its axes."""
+    """The sweep's own question, or one made from its axes."""
     asked = report.manifest.config.get("question")
     if asked:
         return asked
     what = listed(report.result.fields)
     if report.result.question is None:
-        return f"How does {report.result.strategies[0]} fare against {what}?"
+        return f"How does {report.result.strategies[0]} depend on {what}?"
     first, second = report.result.question
     return f"How does the difference between {first} and {second} depend on {what}?"
 
@@ -94,7 +94,7 @@ def over(report: SweepReport, frame: pl.DataFrame) -> Section:
     """Figures and tables over all points.
 
     Args:
-      frame: the rows that it was made from.
+      frame: the rows that the report was made from.
     """
     grids = []
     for sheet in report.sheets:
@@ -112,7 +112,7 @@ def over(report: SweepReport, frame: pl.DataFrame) -> Section:
 
 
 def sweep_plots(result: SweepResult, axes: tuple[str, ...]) -> tuple[Plot, ...]:
-    """A line for each quantity over one axis, a heat map over two, else dots over each field."""
+    """A line for each quantity over one axis, a heat map over two, otherwise dots over each field."""
     panels = difference_panels(result)
     drawn: list[tuple[str, Figure, str]] = []
     level = f"with intervals at {100 * result.level:g} %"
@@ -124,7 +124,7 @@ def sweep_plots(result: SweepResult, axes: tuple[str, ...]) -> tuple[Plot, ...]:
         for k, panel in enumerate((*panels, *rate_panels(result))):
             caption = f"{plain(panel)}."
             if panel.signed:
-                caption += f" Blue: {result.question[0]} is better. Framed: the interval leaves zero out."
+                caption += f" Blue: {result.question[0]} is better. Framed: the interval excludes zero."
             drawn.append((f"sweep-{k}", heat_map(result, *axes, panels=(panel,)), caption))
     else:
         for k, field in enumerate(result.fields):
@@ -148,12 +148,12 @@ def own_plots(result: SweepResult, frame: pl.DataFrame, field: str) -> tuple[Plo
 
 
 def plain(panel: Panel) -> str:
-    """A panel's title in a sentence."""
+    """A panel's title on one line."""
     return panel.title.replace("\n", " ").replace(" [%]", ", in %")
 
 
 def only(point: PointResult, field: str) -> PointResult:
-    """A point as if one field were swept alone."""
+    """A point as if only one field were swept."""
     return replace(point, values={field: point.values[field]})
 
 

@@ -18,25 +18,25 @@ from jaxbiped.statistics import ALL, CODES, Comparison, Estimate, PairComparison
 Row = tuple[str, ...]
 MEANING = {
     "spl": "success weighted by path length",
-    "clearance": "the least distance from boxes",
-    "replans": "plans but the first",
-    "measuring": "the share of time spent so",
-    "energy": "work of the servos",
+    "clearance": "the smallest distance from boxes",
+    "replans": "plans after the first",
+    "measuring": "the share of time spent measuring",
+    "energy": "work done by the servos",
 }
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """A table of text, ready to be shown anywhere. The first column is left-aligned, the others right-aligned."""
+    """A table of text that can be shown anywhere. The first column is left-aligned, the others right-aligned."""
 
     title: str
     columns: Row
-    groups: tuple[tuple[Row, ...], ...]  # rows, in groups that a line divides
+    groups: tuple[tuple[Row, ...], ...]  # rows, in groups separated by a line
     notes: tuple[str, ...] = ()
 
 
 def to_rich(sheet: Sheet) -> Table:
-    """For the terminal."""
+    """A sheet for the terminal."""
     table = Table(
         title=sheet.title,
         title_justify="left",
@@ -57,7 +57,7 @@ def to_rich(sheet: Sheet) -> Table:
 
 
 def to_markdown(sheet: Sheet) -> str:
-    """For `summary.md`, title and notes included."""
+    """A sheet for `summary.md`, including title and notes."""
     lines = [f"### {sheet.title}", ""]
     rules = [":--"] + ["--:"] * (len(sheet.columns) - 1)
     rows = [sheet.columns, tuple(rules), *(row for group in sheet.groups for row in group)]
@@ -102,12 +102,12 @@ def markdown_sheets(comparison: Comparison) -> tuple[Sheet, ...]:
 
 
 def strategy_sheets(comparison: Comparison) -> tuple[Sheet, Sheet]:
-    """Each strategy by itself: its success, and its reached missions."""
+    """Each strategy alone: its success, and its reached missions."""
     return success_overall(comparison), reached_sheet(comparison)
 
 
 def success_overall(comparison: Comparison) -> Sheet:
-    """Success of each strategy with its interval, and how much of what is missing no plan could have reached."""
+    """Success of each strategy with its interval, and how much of the missing part no plan could have reached."""
     summaries = [comparison.summary(name) for name in comparison.strategies]
     rows = []
     for item in summaries:
@@ -131,20 +131,17 @@ def reached_sheet(comparison: Comparison) -> Sheet:
         rows.append(cells)
     head = interval_head(comparison)
     columns = ("strategy", "missions", "distance, cm", head, "time, min", head)
-    notes = (
-        "Means over a strategy's own reached missions, so over other arenas than another strategy's; BCa bootstrap "
-        "intervals.",
-    )
+    notes = ("Means over a strategy's own reached missions, which differ between strategies; BCa bootstrap intervals.",)
     return Sheet("Reached missions of each strategy", columns, (tuple(rows),), notes)
 
 
 def interval_head(comparison: Comparison) -> str:
-    """The head of a column of intervals."""
+    """The heading of a column of intervals."""
     return f"{100 * comparison.level:g} % interval"
 
 
 def code_sheet(comparison: Comparison) -> Sheet:
-    """How the missions of each strategy ended; codes that never came are left out."""
+    """How the missions of each strategy ended; codes that never occurred are left out."""
     summaries = [comparison.summary(name) for name in comparison.strategies]
     seen = [i for i in range(len(CODES)) if any(item.codes[i] for item in summaries)]
     rows = tuple((item.strategy, *(str(item.codes[i]) for i in seen)) for item in summaries)
@@ -155,7 +152,7 @@ def pair_sheet(comparison: Comparison, detailed: int | None = None) -> Sheet:
     """Pairs of strategies over all arenas: differences with intervals and corrected p-values.
 
     Args:
-      detailed: how many of the pairs have medians and probabilities too; all by default.
+      detailed: how many of the pairs also get medians and probabilities; all by default.
     """
     pairs = [pair for pair in comparison.pairs if pair.stratum == ALL]
     columns = ("first - second", "arenas", "difference", interval_head(comparison), "p (Holm)")
@@ -167,14 +164,14 @@ def pair_sheet(comparison: Comparison, detailed: int | None = None) -> Sheet:
 PAIR_NOTES = (
     "Success: Tango's score interval, McNemar's exact test. Distance and time: on arenas that both solved; BCa "
     "bootstrap intervals; Wilcoxon's signed-rank test (zeros ranked, then left out: Pratt).",
-    "Differences are first minus second: a negative distance or time says that the first is shorter or faster. "
+    "Differences are first minus second: with a negative distance or time, the first is shorter or faster. "
     "P(shorter), P(faster): the probability that the first is, ties counted half.",
     "p-values are corrected by Holm's method for all tests of the table.",
 )
 
 
 def pair_rows(pair: PairComparison, detailed: bool) -> list[Row]:
-    """One pair as rows: success, then the mean of each metric; with details its median and probability too."""
+    """One pair as rows: success, then the mean of each metric; with details also its median and probability."""
     success = pair.success
     value = signed(100 * success.estimate if success.valid else None, 1)
     rows = [(f"{pair.first} - {pair.second}", "", "", "", "")]
@@ -195,7 +192,7 @@ def pair_rows(pair: PairComparison, detailed: bool) -> list[Row]:
 
 
 def metric_sheet(comparison: Comparison, first: str, second: str) -> Sheet:
-    """Metrics beside success, distance and time: their means by strategy, and a pair's differences."""
+    """Metrics other than success, distance and time: their means by strategy, and a pair's differences."""
     pair, rows = comparison.pair(first, second), []
     for measure in metric_measures(comparison):
         difference, p = part(pair, measure)
@@ -204,7 +201,7 @@ def metric_sheet(comparison: Comparison, first: str, second: str) -> Sheet:
         rows.append((measure.title, *own, str(difference.n), difference_cell(difference, measure), p_cell(p)))
     columns = ("metric", first, second, "both", "difference", "p")
     notes = (
-        f"Means over a strategy's own missions that have the number, then differences where both have it, with "
+        f"Means over a strategy's own missions that have a value, then differences where both have one, with "
         f"{100 * comparison.level:g} % intervals and p-values corrected by Holm's method for this table.",
         *explained(comparison),
     )
@@ -223,7 +220,7 @@ def short_stratum_sheet(comparison: Comparison, first: str, second: str, kind: s
             limits = brackets(estimate, measure.scale, digits)
             star = "*" if p is not None and p < ALPHA else " "
             cells.append((value if limits == NONE else f"{value} {limits}") + star)
-        name = stratum.name.replace(" to ", "–")  # as narrow as a family's
+        name = stratum.name.replace(" to ", "–")  # as narrow as the name of a family
         rows.append((name, str(pair.success.n), cells[0], str(pair.time.n), *cells[1:]))
     columns = (kind, "arenas", "success, points", "both", "distance, cm", "time, min")
     notes = (f"Mean differences, first minus second, with intervals. *: p < {ALPHA:g} after Holm's correction.",)
@@ -236,7 +233,7 @@ def stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) ->
 
 
 def metric_stratum_sheet(comparison: Comparison, first: str, second: str, kind: str) -> Sheet:
-    """The same of metrics beside success, distance and time."""
+    """The same for metrics other than success, distance and time."""
     title = f"Other metrics, {first} - {second} by {kind}"
     return measures_by_stratum(comparison, first, second, kind, metric_measures(comparison), title)
 
@@ -261,7 +258,7 @@ def measures_by_stratum(
 
 
 def explained(comparison: Comparison) -> Row:
-    """What the metrics that are built in mean, those of a comparison."""
+    """The meaning of the built-in metrics in a comparison."""
     said = [f"{name}: {text}" for name, text in MEANING.items() if name in comparison.metrics]
     return (f"{'; '.join(said)}.",) if said else ()
 

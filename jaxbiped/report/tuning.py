@@ -20,11 +20,11 @@ from jaxbiped.study.tuning import DURATIONS, START, SWEPT, TUNED, Gap, TuneConfi
 
 PAPER = (1.0, 1.0, 5.0, 10.0)  # C0 to C3
 COLOURS = {"c1": "#0072B2", "c2": "#CC79A7", "c3": "#D55E00", "c4": "#009E73"}
-SMOOTH = 5  # steps of the running mean in the picture
+SMOOTH = 5  # steps in the running mean of the picture
 
 
 def costs_sheet(tuning: Tuning, config: TuneConfig) -> Sheet:
-    """What was judged on the test arenas."""
+    """The costs that were evaluated on the test arenas."""
     rows = []
     for name, costs in tuning.costs.items():
         test = tuning.test.filter(costs=name)
@@ -37,8 +37,8 @@ def costs_sheet(tuning: Tuning, config: TuneConfig) -> Sheet:
         ("costs", "C0", "C1", "C2", "C3", "C4", "objective\ns", "reached\n%", "time\nmin"),
         (tuple(rows),),
         (
-            f"Objective: the time of a mission, {config.penalty:g} s where it fails or takes longer.",
-            "Time: of those that arrived, so over different arenas.",
+            f"Objective: the time of a mission, {config.penalty:g} s if it fails or takes longer.",
+            "Time: of those that arrived, which are different arenas.",
         ),
     )
 
@@ -62,37 +62,37 @@ def gaps_sheet(tuning: Tuning) -> Sheet:
 
 
 def fits_sheet(fits: Mapping[str, Fit], title: str) -> Sheet:
-    """What costs durations stand for."""
+    """The costs that durations imply."""
     rows = [("the paper's", *(f"{cost:.2f}" for cost in PAPER), "", "")]
     for name, fit in fits.items():
         off = float(np.sqrt(np.mean((fit.fitted - fit.measured) ** 2)))
         rows.append((name, *(f"{cost:.2f}" for cost in fit.costs), f"{fit.seconds:.2f}", f"{off:.1f}"))
     return Sheet(
         title,
-        ("least squares over", "C0", "C1", "C2", "C3", "a unit\ns", "rms\noff s"),
+        ("least squares over", "C0", "C1", "C2", "C3", "a unit\ns", "rms\nerror s"),
         (tuple(rows),),
         (
-            "Scaled: a straight move on the floor costs 2. C4 cannot come from durations.",
-            "Straight moves do not tell C0 from C1: there C1 = C0, as in the paper.",
+            "Scaled: a straight move on the floor costs 2. C4 cannot be derived from durations.",
+            "Straight moves cannot separate C0 from C1: there C1 = C0, as in the paper.",
         ),
     )
 
 
 def estimate(value: Estimate, scale: float = 1.0) -> str:
-    """With its sign and its interval."""
+    """An estimate with its sign and its interval."""
     if value.estimate is None:
         return NONE
     return f"{signed(value.estimate * scale, 1)} {brackets(value, scale)}"
 
 
 def costs_toml(costs: tuple[float, ...], comments: tuple[str, ...]) -> str:
-    """A study file with these costs, which `jaxbiped compare` takes."""
+    """A study file with these costs, for `jaxbiped compare`."""
     lines = [f"# {line}" for line in comments] + ["[mission.costs]"]
     return "\n".join([*lines, *(f"c{k} = {float(cost)!r}" for k, cost in enumerate(costs))]) + "\n"
 
 
 def sentence(tuning: Tuning) -> str:
-    """The answer, whatever its sign."""
+    """The result, whatever its sign."""
     gap = tuning.gaps[0]
     change, limits = signed(gap.objective.estimate, 1), brackets(gap.objective)
     low, high = gap.objective.low, gap.objective.high
@@ -105,7 +105,7 @@ def sentence(tuning: Tuning) -> str:
 
 @own_style()
 def picture(tuning: Tuning) -> Figure:
-    """Costs and objective over the steps, and what came of it on the test arenas."""
+    """Costs and objective over the steps, and the result on the test arenas."""
     figure = Figure(figsize=(11.0, 3.6), layout="constrained")
     paths, gain, gaps = figure.subplots(1, 3, width_ratios=(1.1, 1, 1))
     draw_paths(paths, tuning)
@@ -115,7 +115,7 @@ def picture(tuning: Tuning) -> Figure:
 
 
 def draw_paths(ax: Axes, tuning: Tuning) -> None:
-    """The costs at each step; dots: what they were taken to be in the end."""
+    """Draw the costs at each step; dots: the final costs."""
     style(ax, "y")
     steps = tuning.history["step"].to_numpy()
     for k, (name, colour) in enumerate(COLOURS.items(), start=1):
@@ -127,11 +127,11 @@ def draw_paths(ax: Axes, tuning: Tuning) -> None:
     ax.set_yscale("log")
     ax.set_xlim(None, len(steps) * 1.12)
     ax.set_xlabel("step")
-    ax.set_title("costs, from the dotted ones", fontsize=10)
+    ax.set_title("costs, starting at the dotted lines", fontsize=10)
 
 
 def draw_gain(ax: Axes, tuning: Tuning) -> None:
-    """The objective of each step's perturbed costs against that of the start on the same arenas."""
+    """Draw the objective of each step's perturbed costs against that of the start on the same arenas."""
     style(ax, "y")
     steps = tuning.history["step"].to_numpy()
     gain = (tuning.history["objective"] - tuning.history["start"]).to_numpy()
@@ -140,11 +140,11 @@ def draw_gain(ax: Axes, tuning: Tuning) -> None:
     if len(gain) >= SMOOTH:
         ax.plot(steps[SMOOTH - 1 :], np.convolve(gain, np.ones(SMOOTH) / SMOOTH, "valid"), color=INK, lw=1.5)
     ax.set_xlabel("step")
-    ax.set_title("objective of perturbed costs less start [s]", fontsize=10)
+    ax.set_title("objective of perturbed costs minus start [s]", fontsize=10)
 
 
 def draw_gaps(ax: Axes, gaps: tuple[Gap, ...]) -> None:
-    """Differences of the objective on the test arenas."""
+    """Draw differences of the objective on the test arenas."""
     style(ax, "x")
     ax.axvline(0, color=INK, lw=1)
     for y, gap in enumerate(gaps):
@@ -166,7 +166,7 @@ def draw_gaps(ax: Axes, gaps: tuple[Gap, ...]) -> None:
 
 
 def write_tuning(folder: Path, tuning: Tuning, config: TuneConfig, command: str) -> None:
-    """`costs.toml`, `tune.png` and `summary.md` into a folder that exists."""
+    """Write `costs.toml`, `tune.png` and `summary.md` into an existing folder."""
     comments = (f"Written by: {command}", sentence(tuning))
     write_whole(folder / "costs.toml", lambda file: file.write(costs_toml(tuning.costs[TUNED], comments).encode()))
     write_whole(folder / "tune.png", saver(picture(tuning)))
@@ -175,25 +175,25 @@ def write_tuning(folder: Path, tuning: Tuning, config: TuneConfig, command: str)
     lines += ["## How it was made", "", f"- Command: `{command}`", f"- {missions(config)}", ""]
     lines += ["- `costs.toml` is a study file with the tuned costs: `jaxbiped compare costs.toml`."]
     lines += [
-        "- `history.parquet`: a row a step; `sweep.parquet`: a row a point; `test.parquet`: a row a test mission."
+        "- `history.parquet`: one row per step; `sweep.parquet`: one per point; `test.parquet`: one per test mission."
     ]
     write_whole(folder / "summary.md", lambda file: file.write(("\n".join(lines) + "\n").encode()))
 
 
 def missions(config: TuneConfig) -> str:
-    """How many, in a sentence."""
+    """The number of missions, in a sentence."""
     text = f"{config.tuning_missions:,} missions of tuning on {config.arenas:,} training arenas"
     if config.sweep:
         swept = config.sweep_points * config.arenas
         text += f", {swept:,} of a sweep over {config.sweep_points} Sobol points on the same arenas"
-    return text + f"; judged on {config.test_arenas:,} other arenas."
+    return text + f"; evaluated on {config.test_arenas:,} other arenas."
 
 
 def how(config: TuneConfig) -> str:
-    """The method, for who reads the tables."""
+    """The method, for readers of the tables."""
     return (
         f"`{START}`: the costs of the mission. `{TUNED}`: sign descent over {config.steps} steps in the logarithms of "
         f"C1 to C4 with C0 fixed, within {config.low:g} to {config.high:g} C0, on gradients from {config.pairs} pairs "
-        f"of perturbed costs a step; the mean over the second half. `{SWEPT}`: the point with the least objective over "
-        f"all training arenas. `{DURATIONS}`: least squares of the times of the moves, measurements included."
+        f"of perturbed costs per step; the mean over the second half. `{SWEPT}`: the point of lowest objective over "
+        f"all training arenas. `{DURATIONS}`: least squares on the durations of the moves, including measurements."
     )

@@ -22,8 +22,8 @@ from jaxbiped.physics.native import Native
 from jaxbiped.physics.native import Options as NativeOptions
 
 SIZE = (400, 300)  # [px] width and height
-FRAMES_PER_SECOND, LONGEST = 10.0, 6.0  # [1/s], [s] of a video: what takes longer is played faster
-HOLD = 1.0  # [s] of the last frame
+FRAMES_PER_SECOND, LONGEST = 10.0, 6.0  # [1/s], [s] of a video: longer primitives are played faster
+HOLD = 1.0  # [s] duration of the last frame
 COLOURS = 96
 
 
@@ -32,7 +32,7 @@ def rendering(model: mujoco.MjModel, size: tuple[int, int]) -> Iterator[tuple[mu
     """OpenGL without a window: EGL on Linux, unless the environment variable MUJOCO_GL names another.
 
     Raises:
-      InputError: there is no such OpenGL.
+      InputError: OpenGL is not available.
     """
     try:
         if sys.platform == "linux" and "MUJOCO_GL" not in os.environ:
@@ -41,9 +41,9 @@ def rendering(model: mujoco.MjModel, size: tuple[int, int]) -> Iterator[tuple[mu
             from mujoco.gl_context import GLContext
         gl = GLContext(*size)
         gl.make_current()
-    except Exception as error:  # whatever the system's libraries raise
+    except Exception as error:  # any error of the system's libraries
         said = (str(error).strip() or type(error).__name__).splitlines()[0]
-        raise InputError(f"cannot be rendered, for want of OpenGL (--no-videos goes without): {said}",
+        raise InputError(f"cannot be rendered without OpenGL (--no-videos skips videos): {said}",
                          field="videos") from None  # fmt: skip
     try:
         context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
@@ -58,7 +58,7 @@ def save_primitive(path: str | Path, name: str, table: PrimitiveTable, robot: Ro
     """Write one undisturbed trial as an animated GIF.
 
     Raises:
-      InputError: there is no OpenGL, or the file cannot be written.
+      InputError: OpenGL is not available, or the file cannot be written.
     """
     spec = trial_spec(robot, boxes_of(table.request))
     paint(spec)
@@ -78,7 +78,7 @@ def save_primitive(path: str | Path, name: str, table: PrimitiveTable, robot: Ro
 
 
 def paint(spec: mujoco.MjSpec) -> None:
-    """A floor of tiles of 5 cm, one cell each, on which movement is seen."""
+    """Add a floor of 5 cm tiles, one per cell, that makes movement visible."""
     spec.add_texture(name="tiles", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
                      rgb1=(0.62, 0.66, 0.70), rgb2=(0.54, 0.58, 0.62), width=256, height=256)  # fmt: skip
     spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
@@ -95,11 +95,11 @@ def render(model: mujoco.MjModel, qpos: np.ndarray, table: PrimitiveTable, said:
     camera.distance, camera.azimuth, camera.elevation = 0.95, 125.0, -14.0
     middle = table.request.forward / 2
     camera.lookat[:] = middle, table.request.left / 2, 0.19
-    model.stat.extent, model.stat.center[:] = 1.0, (middle, 0, 0.2)  # depth is not to be spent on far unused boxes
+    model.stat.extent, model.stat.center[:] = 1.0, (middle, 0, 0.2)  # do not spend depth resolution on far unused boxes
     model.vis.quality.shadowsize, model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = 1024, 0.35, 0.5
     for k in range(model.ngeom):
         if model.geom(k).name.startswith("box_") and passes_gate(table.request):
-            model.geom_rgba[k, 3] = 0.55  # a gate that the robot is seen through
+            model.geom_rgba[k, 3] = 0.55  # a gate through which the robot is visible
     viewport = mujoco.MjrRect(0, 0, *SIZE)
     pixels = np.empty((SIZE[1], SIZE[0], 3), np.uint8)
     frames, font = [], ImageFont.load_default(15)

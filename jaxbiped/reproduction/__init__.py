@@ -1,4 +1,4 @@
-"""The experiments of the paper, repeated: what it publishes, where a mission's time goes, the test scenes, the page."""
+"""The experiments of the paper, repeated: its published figures, where a mission's time goes, test scenes, the page."""
 
 from jaxbiped.core.lazy_loading import lazy_package
 

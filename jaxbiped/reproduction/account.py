@@ -1,4 +1,4 @@
-"""What a mission spent its time on, read from its log: each kind of action with its count, its way and its seconds."""
+"""How a mission spent its time, read from its log: each kind of action with its count, distance and seconds."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from jaxbiped.reproduction.paper import Experiment
 STRAIGHT, DIAGONAL, ASIDE = "straight", "diagonal", "aside and back"
 UP, DOWN, GATE, TURN, MEASURE = "step up", "step down", "gate", "turn", "measure"
 KINDS = (STRAIGHT, DIAGONAL, ASIDE, UP, DOWN, GATE, TURN, MEASURE)
-GATE_CARRIES = PAPER["gate"].forward  # [m] that the simulated primitive carries the robot
-SMALL = 1e-3  # [s] by which sums of single precision may be off
+GATE_CARRIES = PAPER["gate"].forward  # [m] displacement of the simulated primitive
+SMALL = 1e-3  # [s] largest error of single-precision sums
 PLAYED_AS = {
     NAMES[Primitive.STEP_UP_BUMP]: UP,
     NAMES[Primitive.STEP_DOWN_BUMP]: DOWN,
@@ -33,7 +33,7 @@ class Part:
     """Actions of one kind."""
 
     count: int = 0
-    metres: float = 0.0  # asked for
+    metres: float = 0.0  # requested
     seconds: float = 0.0
 
     def __add__(self, other: Part) -> Part:
@@ -42,14 +42,14 @@ class Part:
 
 @dataclass(frozen=True)
 class Record:
-    """One mission of an experiment, as figures; its log is drawn, and let go."""
+    """The figures of one mission of an experiment; its log is drawn, and then dropped."""
 
     number: int  # of the experiment; 0 for another scene
     strategy: str
     seed: int
     code: Code
     distance: float  # [m] truly walked
-    moving: float  # [s] of everything but measuring
+    moving: float  # [s] of everything except measuring
     measurements: int
     parts: dict[str, Part]
 
@@ -59,7 +59,8 @@ class Record:
         return self.code == Code.REACHED
 
     def time(self, measure: float) -> float:
-        """[s] with a time for a measurement [s]. No decision depends on it, so that no mission needs to be repeated."""
+        """[s] with a given time for a measurement [s]. No decision depends on it, so no mission needs to be
+        repeated."""
         return self.moving + self.measurements * measure
 
 
@@ -78,14 +79,14 @@ def record(item: Experiment | int, strategy: str, seed: int, mission: Mission, d
 
 
 def parts(mission: Mission, durations: DurationConfig) -> dict[str, Part]:
-    """Each of `KINDS`; their seconds sum to the mission's time."""
+    """The account for each of `KINDS`; their seconds sum to the mission's time."""
     found = dict.fromkeys(KINDS, Part())
     before = 0.0
     for k, played in enumerate(mission.played):
         spent = played.time - before - durations.measure
         before = played.time
         found[MEASURE] += Part(1, 0.0, durations.measure)
-        if spent <= SMALL:  # it only looked, or the mission was over
+        if spent <= SMALL:  # it only looked, or the mission had ended
             continue
         turning = abs(played.turn) / EIGHTH * durations.turn
         if turning > SMALL:
@@ -97,7 +98,7 @@ def parts(mission: Mission, durations: DurationConfig) -> dict[str, Part]:
 
 
 def walked(heading: float, length: float) -> str:
-    """Which kind of walk on the floor: along the grid, across its cells, or to the side or backward.
+    """The kind of walk on the floor: along the grid, across its cells, or sideways or backward.
 
     Args:
       heading: [rad] in the world.
@@ -111,12 +112,12 @@ def walked(heading: float, length: float) -> str:
 
 @dataclass(frozen=True)
 class Measuring:
-    """The one free number: the time of a measurement, and how it explains the published times."""
+    """The one free parameter, the time of a measurement, and how well it explains the published times."""
 
     seconds: float
-    missions: int  # behind it
-    residuals: dict[int, float]  # experiment to [s]: the mission that is shown, less the paper's
-    alone: dict[int, float]  # experiment to [s]: what this experiment by itself would have it be
+    missions: int  # number of missions used
+    residuals: dict[int, float]  # experiment to [s]: the mission shown minus the paper's
+    alone: dict[int, float]  # experiment to [s]: the value from this experiment alone
 
 
 def fit_measuring(
@@ -130,7 +131,7 @@ def fit_measuring(
       shown: the one record of each experiment that tables show.
 
     Returns:
-      None where no mission of a published experiment reached its goal.
+      None if no mission of a published experiment reached its goal.
     """
     wanted = {item.number: 60 * item.minutes for item in experiments}
     used = [each for each in records if each.number in wanted and each.reached]
@@ -149,9 +150,9 @@ def fit_measuring(
 
 
 def other_reading(each: Record) -> Record:
-    """A mission timed as if Table 2's 48 s for a gate were for 15 cm and not for 5, as our own primitive carries.
+    """A mission timed as if Table 2's 48 s for a gate were for 15 cm instead of 5, the length of our own primitive.
 
-    The table's line gives no length. The cost C2 = 5 says 48 s a cell; but 48 s is three cells of 16 s, too.
+    The table gives no length. The cost C2 = 5 suggests 48 s per cell; but 48 s is also three cells of 16 s.
     """
     part = each.parts[GATE]
     spared = part.seconds * (1 - CELL / GATE_CARRIES)
@@ -160,9 +161,9 @@ def other_reading(each: Record) -> Record:
 
 
 def typical(records: Sequence[Record]) -> Record:
-    """The one to show of an experiment's missions: of those that reached the goal the one with the median time.
+    """The mission to show for an experiment: of those that reached the goal, the one with the median time.
 
-    Where none did, the first. Of an even number the faster of the middle two.
+    If none did, the first. For an even number, the faster of the middle two.
     """
     reached = [each for each in records if each.reached]
     if not reached:

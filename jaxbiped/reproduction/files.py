@@ -1,4 +1,4 @@
-"""What the reproduction writes: its page, all figures as JSON and Parquet, and the logs of the missions shown."""
+"""The output of the reproduction: its page, all figures as JSON and Parquet, and the logs of the missions shown."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FIGURES, MISSIONS = "reproduction.json", "missions.parquet"
 
 
 def write(out: Path, found: Findings, args: dict[str, Any], facts: dict[str, str], command: str) -> list[str]:
-    """Write a folder that must not exist; the names of its files.
+    """Write a folder that must not exist; return the names of its files.
 
     Raises:
       InputError: it exists, or cannot be written.
@@ -54,7 +54,7 @@ def write(out: Path, found: Findings, args: dict[str, Any], facts: dict[str, str
 
 
 def save_pictures(folder: Path, found: Findings) -> list[str]:
-    """The robot, and each population, as files of their own; their names."""
+    """Write the robot and each population as separate pictures; return their names."""
     names = []
     robot = strip(found.logs, found.config.walk.biped)
     if robot is not None:
@@ -68,12 +68,12 @@ def save_pictures(folder: Path, found: Findings) -> list[str]:
 
 
 def saver(data: bytes) -> Callable[[Any], object]:
-    """How to write bytes into an open file."""
+    """A function that writes bytes to an open file."""
     return lambda file: file.write(data)
 
 
 def figures(found: Findings) -> dict[str, Any]:
-    """Everything that the page says, as JSON."""
+    """All figures of the page, as JSON."""
     return {
         "answer": answer(found),
         "measure": {"default": found.default, "fitted": dataclasses.asdict(found.fit) if found.fit else None},

@@ -1,4 +1,4 @@
-"""Everything that the page and its files say, gathered."""
+"""All results for the page and its files."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from jaxbiped.reproduction.table_2 import Verified
 
 @dataclass(frozen=True)
 class Findings:
-    """What was found; parts that were skipped are empty."""
+    """The results; parts that were skipped are empty."""
 
     config: MissionConfig  # of the missions in scenes
     experiments: Mapping[int, tuple[Record, ...]]  # by their numbers
-    shown: Mapping[int, Record]  # the one of each that tables and pictures show
-    logs: Mapping[int, MissionLog]  # of these
-    shortest: Mapping[int, float | None]  # [m] of the way by Eq. (1) with perfect knowledge of each scene
-    gate_depth: float  # [m] of the lintel of experiment 6, along the way
+    shown: Mapping[int, Record]  # the mission of each that tables and pictures show
+    logs: Mapping[int, MissionLog]  # their logs
+    shortest: Mapping[int, float | None]  # [m] length of the path by Eq. (1) with perfect knowledge of each scene
+    gate_depth: float  # [m] depth of the lintel of experiment 6, along the path
     fit: Measuring | None
     table_1: Mapping[tuple[str, str], Shown] = field(default_factory=dict)  # (strategy, scene)
     table_2: tuple[Verified, ...] = ()
@@ -32,10 +32,10 @@ class Findings:
 
     @property
     def default(self) -> float:
-        """[s] of a measurement, as the missions' clocks had it."""
+        """[s] Duration of a measurement on the missions' clocks."""
         return self.config.durations.measure
 
     @property
     def measure(self) -> float:
-        """[s] of a measurement: the fitted one, where something could be fitted."""
+        """[s] Duration of a measurement: the fitted one, if it could be fitted."""
         return self.fit.seconds if self.fit else self.default

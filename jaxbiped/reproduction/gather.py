@@ -1,4 +1,4 @@
-"""The missions of the page, played."""
+"""Play the missions of the page."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Done = Callable[[], None]  # called after each mission
 def experiment(
     item: Experiment, arena: Arena, config: MissionConfig, seeds: range, eyes: Eyes | None, done: Done
 ) -> tuple[tuple[Record, ...], Record, MissionLog]:
-    """An experiment with several seeds: all its missions, the one to show, and that one's log."""
+    """Play an experiment with several seeds: all its missions, the one to show, and that one's log."""
     records, logs = [], {}
     for seed in seeds:
         mission = play(arena, config, item.strategy, seed, eyes)
@@ -40,7 +40,7 @@ def experiment(
 def strategies(
     arenas: Mapping[str, Arena], config: MissionConfig, seed: int, eyes: Eyes | None, done: Done
 ) -> dict[tuple[str, str], Shown]:
-    """Each strategy in each test scene of Table 1."""
+    """Play each strategy in each test scene of Table 1."""
     found = {}
     for scene, kinds in SCENES.items():
         for name in TABLE_1:
@@ -50,7 +50,7 @@ def strategies(
 
 
 def mishaps(sensor: str, seed: int, done: Done) -> tuple[Ending, ...]:
-    """Each mission that cannot go well."""
+    """Play each mission that cannot succeed."""
     config, found = MissionConfig(sensor=sensor), []
     with seeing(config) as eyes:
         for mishap in MISHAPS:
@@ -63,7 +63,7 @@ MISSIONS = len(TABLE_1) * len(SCENES), len(MISHAPS), len(EXPERIMENTS)  # of `str
 
 
 def shortest(arena: Arena, config: MissionConfig, strategy: str) -> float | None:
-    """[m] of the way that Eq. (1) prefers with perfect knowledge of a scene; None where there is none."""
+    """[m] Length of the path preferred by Eq. (1) with perfect knowledge of a scene; None if there is none."""
     batch, points = (
         jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], tree) for tree in (arena, config.settings(strategy))
     )
@@ -72,7 +72,7 @@ def shortest(arena: Arena, config: MissionConfig, strategy: str) -> float | None
 
 
 def lintel(arena: Arena) -> float:
-    """[m] depth of the thinnest box overhead; 0 without one."""
+    """[m] Depth of the thinnest overhead box; 0 without one."""
     boxes = jax.device_get(arena.boxes)
     depths = 2 * np.minimum(boxes.half_x, boxes.half_y)[boxes.used & boxes.overhead]
     return float(depths.min()) if len(depths) else 0.0

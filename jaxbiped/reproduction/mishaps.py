@@ -1,7 +1,7 @@
-"""Missions that cannot go well: each has to end, with a code that names what happened.
+"""Missions that cannot succeed: each must end with a code that names what happened.
 
-They walk by nominal displacements, so that what goes wrong is what the scene makes go wrong; what they see, the sensor
-that is asked for measures.
+They move by nominal displacements, so that failures are caused by the scene alone; the requested sensor measures their
+views.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ DROPPED_AFTER = 3  # decisions
 
 @dataclass(frozen=True)
 class Mishap:
-    """One of them."""
+    """One such mission."""
 
     name: str
     what: str  # for people
     boxes: tuple[dict, ...]
     landmarks: tuple[dict, ...]
-    ends: tuple[str, ...]  # codes that name rightly what happened
+    ends: tuple[str, ...]  # codes that correctly name what happened
     contrast: float = 1.0  # of floor and boxes
-    dropped: bool = False  # the boxes are not there at first
+    dropped: bool = False  # whether the boxes are absent at first
 
 
 MISHAPS = (
-    Mishap("no_solution", "a wall from rim to rim: there is no way", (WALL,), BESIDE, ("no_path",)),
+    Mishap("no_solution", "a wall from rim to rim: there is no path", (WALL,), BESIDE, ("no_path",)),
     Mishap(
         "no_landmark", "landmarks only behind the robot: it never sees one", (BLOCK,), BEHIND,
         ("reached", "stuck", "collided"),
@@ -66,7 +66,7 @@ class Ending:
 
     @property
     def named(self) -> bool:
-        """Whether the code is one that names what happened."""
+        """Whether the code correctly names what happened."""
         return self.mission.code.label in self.mishap.ends
 
 
@@ -77,14 +77,14 @@ def arena_of(mishap: Mishap) -> Callable[[int], Arena]:
 
 
 def scene_of(mishap: Mishap, boxes: tuple[dict, ...]) -> SceneConfig:
-    """Its scene; not as `load_scene` has it, which refuses a goal inside an obstacle."""
+    """Its scene; unlike `load_scene`, which rejects a goal inside an obstacle."""
     held = tuple({**box, "contrast": mishap.contrast} for box in boxes)
     scene = {"name": mishap.name, "start": START, "goal": GOAL, "floor_contrast": mishap.contrast}
     return SceneConfig.model_validate(scene | {"boxes": held, "landmarks": mishap.landmarks})
 
 
 def suffer(mishap: Mishap, config: MissionConfig, seed: int, eyes: Eyes | None = None) -> Ending:
-    """Play one; `config` must be none of a simulated biped."""
+    """Play one; `config` must not be for a simulated biped."""
     arena_at = arena_of(mishap)
     if mishap.dropped:
         return Ending(mishap, play_changing(arena_at, config, "full", seed, eyes))

@@ -1,4 +1,4 @@
-"""The page of the reproduction: what `reproduction.html` says, in its order."""
+"""The page of the reproduction: the content of `reproduction.html`, in order."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from jaxbiped.reproduction.tables import (
 PAGE = "reproduction.html"
 TITLE = "The paper, reproduced"
 LIMITATIONS = (
-    "The layouts of the experiments are not in the paper's text. Each scene file says what is known of it and what is "
+    "The layouts of the experiments are not in the paper's text. Each scene file says what is known and what is "
     "chosen; distances depend on what is chosen.",
-    "The paper's robot walked once in each experiment, so that its figures have no interval.",
-    "The paper's Table 2 says 48 s for a gate. It is read here as 48 s for each cell of 5 cm, as C2 = 5 has it.",
+    "The paper's robot walked once in each experiment, so its figures have no interval.",
+    "The paper's Table 2 says 48 s for a gate. It is read here as 48 s for each cell of 5 cm, as C2 = 5 suggests.",
     "Simulated bipeds play their primitives fast; the clock counts the times of Table 2.",
 )
 
@@ -58,7 +58,7 @@ def build(
 
 
 def warnings(found: Findings) -> tuple[str, ...]:
-    """Experiments that did not end at the goal, first of all."""
+    """The experiments that did not end at the goal."""
     said = []
     for item in EXPERIMENTS:
         shown = found.shown[item.number]
@@ -68,7 +68,7 @@ def warnings(found: Findings) -> tuple[str, ...]:
 
 
 def label(code: str) -> str:
-    """A code for people."""
+    """A code as displayed."""
     return code.replace("_", " ")
 
 
@@ -101,13 +101,13 @@ def numbered(numbers: list[int]) -> str:
 
 
 def close(item: Experiment, found: Findings) -> bool:
-    """Whether the mission that is shown takes about as long as the paper's."""
+    """Whether the mission shown takes about as long as the paper's."""
     shown = found.shown[item.number]
     return shown.reached and abs(relative(shown.time(found.measure), 60 * item.minutes)) <= WORTH
 
 
 def walks_as_far(item: Experiment, found: Findings) -> bool:
-    """Whether the mission that is shown walks about as far as the paper's."""
+    """Whether the mission shown walks about as far as the paper's."""
     shown = found.shown[item.number]
     return shown.reached and item.way is not None and abs(shown.distance - item.way) <= FAR
 
@@ -139,7 +139,7 @@ def keys(found: Findings) -> tuple[Key, ...]:
 
 
 def sections(found: Findings) -> tuple[Section, ...]:
-    """All of them; those of parts that were skipped are left out."""
+    """All sections; those of skipped parts are left out."""
     tables = tuple(to_grid(experiment_sheet(found, table)) for table in (3, 4, None))
     fitted = (to_grid(fit_sheet(found.fit, found.shown)), *other_gate(found)) if found.fit else ()
     spent = to_grid(account_sheet(found, [item.number for item in PUBLISHED]))
@@ -158,13 +158,13 @@ def sections(found: Findings) -> tuple[Section, ...]:
 
 
 def other_gate(found: Findings) -> tuple[Grid, ...]:
-    """The fit again, had the 48 s for a gate in Table 2 another meaning; figures elsewhere do not use it."""
+    """The fit with another meaning of the 48 s for a gate in Table 2; figures elsewhere do not use it."""
     shown = {number: other_reading(each) for number, each in found.shown.items()}
     records = [other_reading(each) for some in found.experiments.values() for each in some]
     fit = fit_measuring(records, PUBLISHED, shown)
     if not fit:
         return ()
-    title = f"Were the 48 s of Pass-gate for {100 * GATE_CARRIES:.0f} cm and not for each cell: a"
+    title = f"If the 48 s of Pass-gate were for {100 * GATE_CARRIES:.0f} cm instead of each cell: a"
     return (to_grid(fit_sheet(fit, shown, title)),)
 
 

@@ -1,4 +1,5 @@
-"""What the paper publishes of its experiments (section 3.2, Tables 1, 3 and 4), and which missions repeat them."""
+"""The paper's published figures of its experiments (section 3.2, Tables 1, 3 and 4), and the missions that repeat
+them."""
 
 from __future__ import annotations
 
@@ -13,7 +14,7 @@ GOAL_RADIUS = 0.10  # [m] (paper, 3.1)
 
 @dataclass(frozen=True)
 class Experiment:
-    """One of the six: how it is repeated, and what the paper measured."""
+    """One of the six experiments: how it is repeated, and the paper's measurements."""
 
     number: int
     strategy: str
@@ -22,8 +23,8 @@ class Experiment:
     distance: float | None = None  # [m] travelled (paper, Table 3)
     minutes: float | None = None  # (paper, Tables 3 and 4)
     straight: float | None = None  # [m] from start to goal (paper, 3.2)
-    table: int | None = None  # that gives its time
-    edges: int = 0  # of bumps that the robot steps over (paper, 3.2)
+    table: int | None = None  # table that gives its time
+    edges: int = 0  # number of bump edges that the robot steps over (paper, 3.2)
     gate: bool = False
 
     @property
@@ -33,7 +34,7 @@ class Experiment:
 
     @property
     def way(self) -> float | None:
-        """[m] that the paper's robot went: the published distance, else the straight one, which is close to it."""
+        """[m] Distance covered by the paper's robot: the published one, else the straight one, which is close to it."""
         return self.distance or self.straight
 
 
@@ -47,7 +48,7 @@ EXPERIMENTS = (
 )
 PUBLISHED = tuple(item for item in EXPERIMENTS if item.minutes)
 SAVED = (EXPERIMENTS[3].distance - EXPERIMENTS[4].distance, EXPERIMENTS[3].minutes - EXPERIMENTS[4].minutes)
-"""[m] and [min] that the paper's robot saved by going over the bump (Table 3)."""
+"""[m] and [min] that the paper's robot saved by crossing the bump (Table 3)."""
 
 # Table 1: may the robot move there (O, X), and can it measure it (M, U)? Floor, obstacle, bump, gate.
 TABLE_1 = {
@@ -61,9 +62,10 @@ TABLE_1 = {
 
 @dataclass(frozen=True)
 class Expected:
-    """What Table 2 alone says of a way: straight cells, edges, at least one cell of gate, a measurement a cell. [s]"""
+    """Time of a path by Table 2 alone [s]: straight cells, edges, at least one cell of gate, one measurement per
+    cell."""
 
-    cells: float  # of 5 cm, on the whole way
+    cells: float  # of 5 cm, on the whole path
     straight: float
     edges: float
     gate: float
@@ -76,7 +78,7 @@ class Expected:
 
 
 def expected(item: Experiment, measure: float) -> Expected | None:
-    """Table 2 for the paper's way, with a time for a measurement [s]; None where the paper gives no way."""
+    """Table 2 for the paper's path, with a time for a measurement [s]; None if the paper gives no path."""
     if item.way is None:
         return None
     cells = item.way / CELL

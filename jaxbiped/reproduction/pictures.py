@@ -1,4 +1,4 @@
-"""Pictures of an experiment, after Figs. 12 to 17 of the paper: the map as it grew, the plan, and what was walked."""
+"""Pictures of an experiment, as in Figs. 12 to 17 of the paper: the growing map, the plan, and the track."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from jaxbiped.report.pictures import draw_map, moment
 from jaxbiped.report.style import own_style
 
 KEY = (
-    "Maps as the robot held them: grey floor, blue bump with its level, purple gate, red obstacle and all that is too "
-    "near to one, white unmeasured. Green: the plan. Black: walked, from the ring to the cross. Outlines are the "
-    "true boxes, discs and squares landmarks."
+    "Maps as the robot held them: grey floor, blue bump with its level, purple gate, red obstacle and everything too "
+    "close to one, white unmeasured. Green: the plan. Black: the track, from the ring to the cross. Outlines are the "
+    "true boxes; discs and squares are landmarks."
 )
 
 
@@ -37,12 +37,12 @@ def map_figure(log: MissionLog, t: int, *, plan: bool = True) -> Figure:
 def growing(log: MissionLog) -> list[Plot]:
     """The map at the first, third and last measurement (paper, Figs. 12 and 13), the last with the whole track."""
     last = len(log.time) - 1
-    measured = last  # measurements that the log holds; what came of the last one is its last moment
+    measured = last  # measurements in the log; the outcome of the last one is its last moment
     plots = []
     for number in dict.fromkeys((1, min(3, measured), measured)):
         t = number - 1 if number < measured else last
         name = f"Measurement {number} of {measured}" + (
-            f", and the whole way: {log.outcome.replace('_', ' ')}." if t == last else "."
+            f", and the whole track: {log.outcome.replace('_', ' ')}." if t == last else "."
         )
         plots.append(Plot(picture(map_figure(log, t), name), name))
     return plots

@@ -1,4 +1,4 @@
-"""The population behind the paper's example: what crossing saved, and where it stops to pay."""
+"""The population behind the paper's example: what crossing saved, and where it stops paying."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from jaxbiped.statistics.intervals import mean_and_median
 
 BAR, PAPER = "#0072B2", "#D55E00"
 BINS = 30
-OUTER = 0.005  # share of the arenas, on each side, that would make a histogram wide
+OUTER = 0.005  # share of outlying arenas, on each side, that would widen a histogram
 WIDTHS, DETOURS = 4, 6  # of the map
-FEWEST = 5  # arenas of a cell of the map
-EQUATION_1 = 2 * (10 - 1) / (1 + 1) * CELL  # [m] of floor cells that cost what two steps cost more: 2 (C3 - C1)
+FEWEST = 5  # fewest arenas in a cell of the map
+EQUATION_1 = 2 * (10 - 1) / (1 + 1) * CELL  # [m] of floor cells that cost as much as two steps cost extra: 2 (C3 - C1)
 COLUMNS = {"distance": ("saved_distance", SAVED[0]), "time": ("saved_time", 60 * SAVED[1])}
 
 
@@ -41,7 +41,7 @@ def population_section(population: Population, measure: float) -> Section:
 
 
 def drawn(population: Population, measure: float) -> tuple[Plot, ...]:
-    """The figures of one population, which has arenas that both solved."""
+    """The figures of one population with arenas that both solved."""
     plots = []
 
     def add(name: str, figure: Figure, caption: str) -> None:
@@ -51,14 +51,14 @@ def drawn(population: Population, measure: float) -> tuple[Plot, ...]:
         for kind in (DISTANCE, TIME):
             figure, ax = canvas(WIDTH, 3.2)
             histogram(ax, population, kind)
-            caption = f"Saved {kind.name} by going over bumps, on {len(population.both):,} arenas that both solved. "
-            caption += f"The outermost bars hold the {100 * OUTER:g} % that lie further out on each side."
+            caption = f"Saved {kind.name} by crossing bumps, on {len(population.both):,} arenas that both solved. "
+            caption += f"The outermost bars include the {100 * OUTER:g} % farther out on each side."
             add(f"saved-{kind.name}", figure, caption)
         figure = Figure(figsize=(WIDTH, 3.6), layout="constrained")
         pay_map(figure.subplots(), population, measure)
         caption = (
-            f"Median minutes saved{'' if population.always is None else ' where it is always crossed'}, by the width "
-            "of the bump along the way and the detour round it. Framed: the interval leaves zero out. Line: where two "
+            f"Median minutes saved{'' if population.always is None else ' if it is always crossed'}, by the width "
+            "of the bump along the path and the detour around it. Framed: the interval excludes zero. Line: where two "
             f"steps take as long as the detour by Table 2 alone, {centimetres(break_even(measure))}."
         )
         add("pays", figure, caption)
@@ -66,12 +66,12 @@ def drawn(population: Population, measure: float) -> tuple[Plot, ...]:
 
 
 def centimetres(metres: float) -> str:
-    """For people."""
+    """A length as text."""
     return f"{100 * metres:.0f} cm"
 
 
 def sentences(population: Population, measure: float) -> list[str]:
-    """What the population says of the paper's example."""
+    """The population compared to the paper's example."""
     both, pair = population.both, population.pair
     if both.is_empty():
         return ["No arena was solved by both."]
@@ -84,7 +84,7 @@ def sentences(population: Population, measure: float) -> list[str]:
     )
     crosses, saved = both["crosses"].to_numpy(), both["saved_time"].to_numpy() / 60
     said.append(
-        f"With perfect knowledge the way over the bump is the cheaper one, by Eq. (1), on {100 * crosses.mean():.0f} % "
+        f"With perfect knowledge, crossing the bump is cheaper, by Eq. (1), on {100 * crosses.mean():.0f} % "
         f"of them; there crossing saved {mean(saved[crosses])} min on average, elsewhere {mean(saved[~crosses])}. "
         f"Only {pair.first} reached the goal on {pair.first_only:,} arenas, only {pair.second} on {pair.second_only:,}."
     )
@@ -92,22 +92,22 @@ def sentences(population: Population, measure: float) -> list[str]:
     if even:
         who = "of a robot that always crosses (C3 = C1)" if population.always is not None else "where it crosses"
         said.append(
-            f"Saved time rises with the detour: a plane through the times {who} is zero at a detour of "
+            f"Saved time increases with the detour: a plane fitted to the times {who} is zero at a detour of "
             f"{centimetres(even.detour)} [{100 * even.low:.0f}, {100 * even.high:.0f}] for a bump "
-            f"{centimetres(even.width)} wide ({even.arenas:,} arenas). Below that crossing does not pay. Table 2 "
-            f"alone, with two steps and a measurement in each cell, says {centimetres(break_even(measure))}; Eq. (1) "
+            f"{centimetres(even.width)} wide ({even.arenas:,} arenas). Below that, crossing does not pay. Table 2 "
+            f"alone, with two steps and a measurement in each cell, gives {centimetres(break_even(measure))}; Eq. (1) "
             f"crosses from {centimetres(EQUATION_1)} on."
         )
     return said
 
 
 def mean(values: np.ndarray) -> str:
-    """For people."""
+    """A mean as text."""
     return signed(float(values.mean()), 1) if len(values) else "nothing"
 
 
 def ordinal(value: float) -> str:
-    """As in "71st"; with a decimal where a whole number would say none or all."""
+    """As in "71st"; with a decimal where a whole number would mean none or all."""
     text = f"{value:.0f}" if 1 <= value <= 99 else f"{value:.1f}".removesuffix(".0")
     if "." in text or text[-2:] in ("11", "12", "13"):
         return f"{text}th"
@@ -155,7 +155,7 @@ def edges(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def pay_map(ax: Axes, population: Population, measure: float) -> None:
-    """Median saved time over width and detour: a few missions that wander would make a mean theirs."""
+    """Median saved time over width and detour: a mean would be dominated by a few missions that wander."""
     both = population.tried
     width, detour, saved = (both[name].to_numpy() for name in ("width", "detour", "saved_time"))
     across, along = edges(width, WIDTHS), edges(detour, DETOURS)
@@ -166,7 +166,7 @@ def pay_map(ax: Axes, population: Population, measure: float) -> None:
         inside = saved[(row == i) & (column == j)] / 60
         if len(inside) >= FEWEST:
             _, estimate = mean_and_median(inside, seed=0, resamples=999)
-            values[i, j] = round(estimate.estimate, 1) + 0.0  # of which none is a negative zero
+            values[i, j] = round(estimate.estimate, 1) + 0.0  # avoids negative zeros
             shown[i, j] = estimate.low is not None and not estimate.low <= 0 <= estimate.high
     fill_map(ax, values, shown, Panel("", 1.0, 1, True, BETTER_UP))
     ticks(ax, across, along)
@@ -180,11 +180,11 @@ def ticks(ax: Axes, across: np.ndarray, along: np.ndarray) -> None:
     ax.set_xticks(np.arange(len(across)) - 0.5, [f"{100 * x:.0f}" for x in across])
     ax.set_yticks(np.arange(len(along)) - 0.5, [f"{100 * y:.0f}" for y in along])
     ax.set_xlabel("width of the bump [cm]")
-    ax.set_ylabel("detour round it [cm]")
+    ax.set_ylabel("detour around it [cm]")
 
 
 def saved_sheet(populations: tuple[Population, ...]) -> Sheet:
-    """What crossing saved, in each population, with its place of the paper's case."""
+    """What crossing saved in each population, with the percentile of the paper's case."""
     rows = []
     for each in populations:
         for kind in (DISTANCE, TIME):

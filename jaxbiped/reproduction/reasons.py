@@ -1,4 +1,4 @@
-"""Why a figure of ours is not the paper's: sentences that are read off the mission's own log."""
+"""Why our figures differ from the paper's: sentences derived from the mission's own log."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from jaxbiped.reproduction.account import (
 )
 from jaxbiped.reproduction.paper import Experiment, expected
 
-WORTH = 0.10  # share of the paper's time, from which on a difference is explained
-FAR = 0.10  # [m] the same of a distance
-LEAST = 12.0  # [s] of a part that is named
+WORTH = 0.10  # relative difference in time above which it is explained
+FAR = 0.10  # [m] the same for a distance
+LEAST = 12.0  # [s] shortest part that is named
 
 
 def relative(ours: float, paper: float) -> float:
-    """As a share of the paper's."""
+    """The difference relative to the paper's value."""
     return (ours - paper) / paper
 
 
 def time_reason(item: Experiment, record: Record, measure: float, gate_depth: float, radius: float) -> str | None:
-    """Why the time of a mission differs by more than `WORTH`; None where it does not, or is not published.
+    """Why the time of a mission differs by more than `WORTH`; None if it does not, or is not published.
 
-    What Table 2 alone says of the paper's way is set against both: what the paper took beyond it, and what ours did.
+    The time by Table 2 alone for the paper's path is compared to both: the paper's excess over it, and ours.
 
     Args:
-      measure: [s] of a measurement.
-      gate_depth: [m] of the lintel along the way; 0 where there is none.
-      radius: [m] that obstacles are grown by.
+      measure: [s] duration of a measurement.
+      gate_depth: [m] depth of the lintel along the path; 0 if there is none.
+      radius: [m] by which obstacles are grown.
     """
     if not item.minutes or not record.reached or item.way is None:
         return None
@@ -57,7 +57,7 @@ def time_reason(item: Experiment, record: Record, measure: float, gate_depth: fl
         text += (
             f" The lintel is {100 * gate_depth:.0f} cm deep; grown by the robot's radius of {100 * radius:.1f} cm on "
             f"both sides, it makes a gate of {100 * (gate_depth + 2 * radius):.0f} cm, each cell of which takes "
-            f"three times as long as one of floor. Were the 48 s of Table 2 for {100 * GATE_CARRIES:.0f} cm, ours "
+            f"three times as long as one of floor. If the 48 s of Table 2 were for {100 * GATE_CARRIES:.0f} cm, ours "
             f"would take {minutes(other_reading(record).time(measure))} min."
         )
     if abs(unexplained) > abs(excess):
@@ -66,7 +66,7 @@ def time_reason(item: Experiment, record: Record, measure: float, gate_depth: fl
 
 
 def parts_beyond(item: Experiment, record: Record, measure: float) -> list[tuple[float, str]]:
-    """Each kind of action minus what Table 2 has for it: [s], and its name."""
+    """Time of each kind of action beyond that of Table 2: [s], and its name."""
     table, parts = expected(item, measure), record.parts
     floor, edges = parts[STRAIGHT] + parts[DIAGONAL], parts[UP] + parts[DOWN]
     walked = f"{100 * floor.metres:.0f} cm, {parts[DIAGONAL].count} of {floor.count} moves diagonal"
@@ -84,10 +84,10 @@ def parts_beyond(item: Experiment, record: Record, measure: float) -> list[tuple
 
 
 def distance_reason(item: Experiment, record: Record, shortest: float | None) -> str | None:
-    """Why the distance of a mission differs by more than `FAR`; None where it does not, or none is published.
+    """Why the distance of a mission differs by more than `FAR`; None if it does not, or none is published.
 
     Args:
-      shortest: [m] of the way that Eq. (1) prefers with perfect knowledge of our scene.
+      shortest: [m] length of the path preferred by Eq. (1) with perfect knowledge of our scene.
     """
     paper = item.way
     if paper is None or not record.reached or abs(record.distance - paper) <= FAR:
@@ -100,15 +100,15 @@ def distance_reason(item: Experiment, record: Record, shortest: float | None) ->
         return text
     aside = record.parts[ASIDE].metres
     return text + (
-        f" With perfect knowledge of the scene, the way that Eq. (1) prefers is {100 * shortest:.0f} cm: "
-        f"{signed(100 * (shortest - paper), 0)} cm of the difference is our layout, which the paper's text leaves "
-        f"open, and {signed(100 * (record.distance - shortest), 0)} cm came on the way"
+        f" With perfect knowledge of the scene, the path preferred by Eq. (1) is {100 * shortest:.0f} cm: "
+        f"{signed(100 * (shortest - paper), 0)} cm of the difference is due to our layout, which the paper leaves "
+        f"open, and {signed(100 * (record.distance - shortest), 0)} cm arose on the way"
         + (f", {100 * aside:.0f} cm of it to the side or backward." if aside >= 0.005 else ".")
     )
 
 
 def minutes(seconds: float) -> str:
-    """One decimal."""
+    """Minutes with one decimal."""
     return f"{seconds / 60:.1f}"
 
 

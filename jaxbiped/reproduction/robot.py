@@ -1,4 +1,4 @@
-"""Which pictures of the walking robot the page shows of each experiment."""
+"""The pictures of the walking robot that the page shows for each experiment."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ STEPS = {
     "Stepping up": NAMES[Primitive.STEP_UP_BUMP],
     "Stepping down": NAMES[Primitive.STEP_DOWN_BUMP],
 }
-HIGHEST = "At the highest place of its way."
+HIGHEST = "At the highest point of its path."
 QUALITY = 85  # of JPEG
 SMALL, GAP = (400, 300), 8  # [px] of a picture in a strip, and between two
 ABREAST = -90.0  # [deg] a camera on the robot's left
 
 
 def robot_plots(item: Experiment, log: MissionLog, robot: RobotModelConfig) -> tuple[list[Plot], str]:
-    """Pictures of the robot, and why there are none where it was not simulated or cannot be rendered."""
+    """Pictures of the robot, and why there are none if it was not simulated or cannot be rendered."""
     if log.walk is None:
-        return [], "The robot was not simulated, so that there is no picture of it."
+        return [], "The robot was not simulated, so there is no picture of it."
     wanted = moments(item, log)
     if not wanted:
         return [], ""
@@ -47,7 +47,7 @@ def robot_plots(item: Experiment, log: MissionLog, robot: RobotModelConfig) -> t
 def strip(logs: Mapping[int, MissionLog], robot: RobotModelConfig) -> Image.Image | None:
     """The robot stepping up, on the bump, stepping down (experiment 5), and under the gate (6), side by side.
 
-    None where one of these is not in the logs, or nothing can be rendered.
+    None if one of these is not in the logs, or nothing can be rendered.
     """
     over, through = EXPERIMENTS[4], EXPERIMENTS[5]
     if any(logs[item.number].walk is None for item in (over, through)):
@@ -79,7 +79,7 @@ def moments(item: Experiment, log: MissionLog) -> dict[str, int]:
                 wanted[f"{name}, {k} of {len(STAGES)}."] = frames[int(stage * (len(frames) - 1))]
         wanted[HIGHEST] = int(np.argmax(log.walk.qpos[:, 2]))
     elif item.gate:
-        wanted["Squatting under the lintel, which is drawn to be seen through."] = nearest_to(log, "gate")[0]
+        wanted["Squatting under the lintel, which is drawn transparent."] = nearest_to(log, "gate")[0]
     elif any(outline.kind == "obstacle" for outline in log.outlines):
         number, away = nearest_to(log, "obstacle")
         wanted[f"Passing the obstacle, {100 * away:.0f} cm from its middle."] = number

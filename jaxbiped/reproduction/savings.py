@@ -31,32 +31,32 @@ class Population:
     arenas: int
     comparison: Comparison
     both: pl.DataFrame  # arenas that both solved: saved_distance [m], saved_time [s], width, detour [m], crosses
-    always: pl.DataFrame | None = None  # the same of a robot that steps over bumps as if they were floor
+    always: pl.DataFrame | None = None  # the same for a robot that steps over bumps as if they were floor
 
     @property
     def pair(self) -> PairComparison:
-        """Over all arenas."""
+        """The comparison over all arenas."""
         return self.comparison.pair(CROSSES, GOES_ROUND, ALL)
 
     def percentile(self, column: str, value: float) -> float:
-        """Share of the arenas that saved less than a value, those that saved as much counted half."""
+        """Share of the arenas that saved less than a value, with ties counted half."""
         saved = self.both[column].to_numpy()
         return float(((saved < value).mean() + (saved <= value).mean()) / 2) if len(saved) else float("nan")
 
     @property
     def tried(self) -> pl.DataFrame:
-        """What tells best where crossing pays: a robot that always crosses, where there is one."""
+        """The best data on where crossing pays: those of a robot that always crosses, if there is one."""
         return self.both if self.always is None else self.always
 
 
 def study(arenas: int, seed: int, executor: str) -> StudyConfig:
-    """What is run."""
+    """The study to run."""
     mission = MissionConfig(executor=executor, sensor="raycast")
     return StudyConfig(seed=seed, arenas=arenas, families=(FAMILY,), strategies=(CROSSES, GOES_ROUND), mission=mission)
 
 
 def always(config: StudyConfig) -> StudyConfig:
-    """The same arenas for a robot that crosses wherever that is shorter: a step costs what floor costs, C3 = C1."""
+    """The same arenas for a robot that crosses whenever that is shorter: a step costs as much as floor, C3 = C1."""
     costs = config.mission.costs.model_copy(update={"c3": config.mission.costs.c1})
     mission = config.mission.model_copy(update={"costs": costs})
     return config.model_copy(update={"strategies": (CROSSES,), "mission": mission})
@@ -69,7 +69,7 @@ def population(
 
     Args:
       frame: rows of `schema.SCHEMA`, timed by the config's durations.
-      measure: [s] of a measurement to tell times with instead; no decision depends on it.
+      measure: [s] duration of a measurement, to recompute times; no decision depends on it.
       crossing: rows of `always`.
     """
     more = measure - config.mission.durations.measure
@@ -82,14 +82,14 @@ def population(
 
 
 def timed(frame: pl.DataFrame, more: float) -> pl.DataFrame:
-    """Rows with so many seconds more for each measurement."""
+    """Rows with this many additional seconds for each measurement."""
     return frame.with_columns(
         [(pl.col(name) + pl.col("measurements") * more).cast(pl.Float64) for name in ("time", "elapsed")]
     )
 
 
 def saved(over: pl.DataFrame, round_it: pl.DataFrame, config: StudyConfig) -> pl.DataFrame:
-    """What the first saved on the arenas that both solved."""
+    """The savings of the first on the arenas that both solved."""
     both = over.join(round_it, on="arena", suffix="_round").sort("arena")
     both = both.join(measures(both["arena"].to_numpy(), config), on="arena")
     return both.filter(pl.col("success") & pl.col("success_round")).select(
@@ -104,7 +104,7 @@ def saved(over: pl.DataFrame, round_it: pl.DataFrame, config: StudyConfig) -> pl
 
 
 def measures(arenas: Int[np.ndarray, "n"], config: StudyConfig) -> pl.DataFrame:
-    """Width of the bump along the way, and the straight distance from start to goal, of each arena [m]."""
+    """Width of the bump along the path, and the straight distance from start to goal, of each arena [m]."""
     index = jnp.asarray(arenas, jnp.int32)
     batch, _ = jax.device_get(draw(jax.random.key(config.seed), index, config.families))
     away = batch.goal_xy - batch.start_xyyaw[:, :2]
@@ -118,14 +118,14 @@ def measures(arenas: Int[np.ndarray, "n"], config: StudyConfig) -> pl.DataFrame:
 
 
 def break_even(measure: float) -> float:
-    """[m] of detour from which on stepping over two edges is faster, by Table 2 alone."""
+    """[m] Detour above which stepping over two edges is faster, by Table 2 alone."""
     extra = TABLE_2.step_up + TABLE_2.step_down - 2 * TABLE_2.straight
     return CELL * extra / (TABLE_2.straight + measure)
 
 
 @dataclass(frozen=True)
 class BreakEven:
-    """The detour [m] at which crossing takes as long as going round, for a bump of some width [m]."""
+    """The detour [m] at which crossing takes as long as walking around, for a bump of some width [m]."""
 
     width: float
     detour: float
@@ -141,7 +141,7 @@ def measured_break_even(frame: pl.DataFrame, seed: int = 0, resamples: int = 999
       frame: `Population.tried`.
 
     Returns:
-      None for fewer than ten arenas where the way over the bump is cheaper, or where time does not rise with detour.
+      None for fewer than ten arenas where crossing the bump is cheaper, or if time does not increase with detour.
     """
     crossed = frame.filter("crosses")
     if len(crossed) < 10:

@@ -1,4 +1,4 @@
-"""The robot in its scene, rendered by MuJoCo from where it really was: after Figs. 10, 11, 14 to 17 of the paper."""
+"""The robot in its scene, rendered by MuJoCo at its true poses, as in Figs. 10, 11, 14 to 17 of the paper."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ COLOURS = {"obstacle": (0.80, 0.30, 0.27, 1), "bump": (0.45, 0.66, 0.90, 1), "ga
 RED, BLUE = (0.9, 0.15, 0.12, 1), (0.05, 0.30, 0.95, 1)
 FLAT = 0.002  # [m] thickness of a landmark
 AWAY, ELEVATION, SIDE = 0.85, -16.0, 125.0  # [m], [deg] of the camera, and [deg] from the robot's heading
-SEEN_THROUGH = 0.45  # of walls and lintels before the robot
+SEEN_THROUGH = 0.45  # opacity of walls and lintels in front of the robot
 
 
 def scene_model(log: MissionLog, robot: RobotModelConfig) -> mujoco.MjModel:
-    """The robot, the boxes of its scene in the colours of maps, and the landmarks; nothing is simulated in it."""
+    """The robot, the boxes of its scene in the colours of maps, and the landmarks; it is not simulated."""
     spec = add_terrain(robot_spec(robot), len(log.outlines))
     paint(spec)
     for k, mark in enumerate(log.landmarks):
@@ -65,11 +65,11 @@ def photographs(
 
     Args:
       frames: their numbers.
-      through: walls and lintels are seen through.
+      through: whether walls and lintels are transparent.
       side: [deg] of the camera's direction from the robot's heading.
 
     Raises:
-      InputError: there is no OpenGL.
+      InputError: OpenGL is not available.
     """
     model, states = scene_model(log, robot), log.walk.qpos
     data, option = mujoco.MjData(model), mujoco.MjvOption()
@@ -104,13 +104,13 @@ def beside(qpos: Float32[np.ndarray, "19"], side: float) -> mujoco.MjvCamera:
 
 
 def frames_of(log: MissionLog, action: str) -> list[int]:
-    """Numbers of the states during the first action of a name; none where it is not in the log."""
+    """Numbers of the states during the first action of a name; none if it is not in the log."""
     held = [k for k, name in enumerate(log.action[1:]) if name == action][:1]  # it is done from moment k to the next
     return [n for n, moment in enumerate(log.walk.moment) if int(moment) in held]
 
 
 def nearest_to(log: MissionLog, kind: str) -> tuple[int, float]:
-    """Number of the state in which the hips are nearest to the middle of a box of a kind, and how far that is [m].
+    """Number of the state in which the hips are nearest to the middle of a box of a kind, and that distance [m].
 
     Raises:
       ValueError: there is no such box.

@@ -25,7 +25,7 @@ def load_scenes(folder: Path, names: tuple[str, ...]) -> dict[str, Arena]:
       InputError: no such folder, or a scene that is missing or wrong.
     """
     if not folder.is_dir():
-        message = "must be a folder with the paper's scenes; those of the source are in its configs/scenes"
+        message = "must be a folder with the paper's scenes; in the source tree they are in configs/scenes"
         raise InputError(message, field="--scenes", value=str(folder))
     return {name: load_scene(folder / f"{name}.toml")[1] for name in names}
 
@@ -38,7 +38,7 @@ def play(arena: Arena, config: MissionConfig, strategy: str, seed: int, eyes: Ey
 def play_changing(
     arena_at: Callable[[int], Arena], config: MissionConfig, strategy: str, seed: int, eyes: Eyes | None = None
 ) -> Mission:
-    """As `play`, in an arena that is another one after so many decisions; not for simulated bipeds.
+    """As `play`, in an arena that changes after some decisions; not for simulated bipeds.
 
     Args:
       arena_at: the arena before each decision, counted from 0. Shapes, start and goal stay.

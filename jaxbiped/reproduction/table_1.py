@@ -1,4 +1,4 @@
-"""Table 1 of the paper, as missions show it: what each strategy passes, and what it measures."""
+"""Table 1 of the paper, from missions: what each strategy passes, and what it measures."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from jaxbiped.mapping import Cell, truth_grid
 from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.settings import MissionConfig, program
 
-SCENES = {  # scene: the classes that its only way leads over, or round
+SCENES = {  # scene: the classes that its only path leads over, or around
     "table_1_floor": (Cell.FLOOR,),
     "table_1_obstacle": (Cell.OBSTACLE,),
     "table_1_bump": (Cell.BUMP,),
     "table_1_gate": (Cell.GATE,),
     "table_1_both": (Cell.BUMP, Cell.GATE),
 }
-ENOUGH = 0.5  # of the true cells that were measured have to be classed right, for a class to count as measured
+ENOUGH = 0.5  # share of the measured true cells that must be classified correctly for a class to count as measured
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What one mission in a test scene shows."""
+    """The result of one mission in a test scene."""
 
-    passed: bool  # its goal was reached
+    passed: bool  # whether its goal was reached
     code: str
-    measured: bool  # what the scene is about, in the map that the robot held at the end
-    share: float  # of its true cells that were measured, the least of its classes
+    measured: bool  # whether the scene's classes are in the robot's final map
+    share: float  # share of its measured true cells that are correct, the lowest of its classes
 
 
 def shown(arena: Arena, mission: Mission, config: MissionConfig, kinds: tuple[Cell, ...]) -> Shown:
-    """What a mission shows of some classes."""
+    """The result of a mission for some classes."""
     spec = program(config, tuple(round(float(v), 6) for v in arena.size_xy)).spec
     truth, _ = truth_on(arena, spec, config.robot.body())
     share = min(right(mission.log.classes[-1], np.asarray(truth), kind) for kind in kinds)
@@ -45,9 +45,9 @@ truth_on = jax.jit(truth_grid, static_argnames=("spec",))
 
 
 def right(classes: Int[np.ndarray, "H W"], truth: Int[np.ndarray, "H W"], kind: Cell) -> float:
-    """Share of a class's true cells, of those that were measured, that it was measured in or right beside.
+    """Share of a class's measured true cells in or right beside which the class was measured.
 
-    A quarter of a class has to be measured at all; a cell beside counts, because a face may lie on a cell's edge.
+    At least a quarter of a class must be measured; a neighbouring cell counts, because a face may lie on a cell's edge.
     """
     true, seen = truth == kind, classes != Cell.UNMEASURED
     measured = true & seen

@@ -1,4 +1,4 @@
-"""Table 2 of the paper: the primitives, simulated anew."""
+"""Table 2 of the paper: the primitives, simulated."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ class Verified:
 
     name: str
     duration: float  # [s] as simulated
-    asked: tuple[float, float, float]  # [m, m, rad] ahead, to the left, turned
+    asked: tuple[float, float, float]  # [m, m, rad] requested: ahead, left, turn
     rise: float  # [m]
-    error: tuple[float, float, float]  # [m, m, rad] where it ends undisturbed, less what was asked for
+    error: tuple[float, float, float]  # [m, m, rad] undisturbed end pose minus the request
     trials: int
     successes: int
-    margin: float  # [m] of the zero moment point, undisturbed
+    margin: float  # [m] margin of the zero moment point, undisturbed
     least_margin: float  # [m] on the mild set
 
     @property
@@ -53,19 +53,19 @@ class Verified:
 
     @property
     def success(self) -> Estimate:
-        """On the mild set."""
+        """Success on the mild set."""
         return proportion(self.successes, self.trials)
 
     @property
     def carries(self) -> str:
-        """For people."""
+        """The displacement as text."""
         ahead, _, turn = self.asked
         text = f"{100 * ahead:.0f} cm" if ahead else f"{math.degrees(turn):.0f}°"
         return text + (f", {100 * abs(self.rise):.0f} cm {'up' if self.rise > 0 else 'down'}" if self.rise else "")
 
     @property
     def off(self) -> str:
-        """[mm] for people."""
+        """The error [mm] as text."""
         return f"{1e3 * math.hypot(*self.error[:2]):.1f}"
 
 

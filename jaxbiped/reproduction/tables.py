@@ -1,4 +1,4 @@
-"""Tables of the page: the paper's four, what a mission's time went to, and the missions that cannot go well."""
+"""Tables of the page: the paper's four, how missions spent their time, and the missions that cannot succeed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from jaxbiped.reproduction.table_2 import Verified
 
 
 def ended(records: Sequence[Record]) -> str:
-    """As in "5 of 5", or with what the others ended as."""
+    """As in "5 of 5", or with the codes of the others."""
     codes = [each.code.label.replace("_", " ") for each in records]
     good = codes.count("reached")
     others = [f"{codes.count(code)} {code}" for code in dict.fromkeys(codes) if code != "reached"]
@@ -27,7 +27,7 @@ def ended(records: Sequence[Record]) -> str:
 
 
 def spread(values: Sequence[float], shown: float, digits: int) -> str:
-    """The figure that is shown, with the least and the greatest where there are several."""
+    """The figure shown, with the smallest and the greatest if there are several."""
     if len(values) < 2:
         return number(shown, digits)
     return f"{shown:.{digits}f} [{min(values):.{digits}f}, {max(values):.{digits}f}]"
@@ -58,7 +58,7 @@ def experiment_row(item: Experiment, found: Findings) -> Row:
 
 
 def way(item: Experiment) -> str:
-    """The paper's distance, and what it is."""
+    """The paper's distance, and its kind."""
     if item.distance:
         return f"{100 * item.distance:.0f}"
     return f"{100 * item.straight:.0f} straight" if item.straight else NONE
@@ -70,18 +70,18 @@ def paper_minutes(item: Experiment) -> str:
 
 
 def experiment_sheet(found: Findings, table: int | None) -> Sheet:
-    """Table 3 or 4 of the paper; None: the experiments that it gives no figures for."""
+    """Table 3 or 4 of the paper; None: the experiments without published figures."""
     title = {
-        3: "Table 3: round the bump, and over it",
+        3: "Table 3: around the bump, and over it",
         4: "Table 4: over two bumps, and through the gate",
-        None: "Experiments 1 and 2, of which the paper gives no figures",
+        None: "Experiments 1 and 2, for which the paper gives no figures",
     }[table]
     rows = tuple(experiment_row(item, found) for item in EXPERIMENTS if item.table == table)
     columns = ("experiment", "reached", "distance\ncm", "paper's\ncm", "off\n%", "time\nmin", "paper's\nmin", "off\n%")
     columns += (f"at {found.default:g} s\nmin",)
     count = max(len(records) for records in found.experiments.values())
     notes = (
-        f"Each is the mission with the median time of {count}; behind it the least and the greatest."
+        f"Each is the mission with the median time of {count}; followed by the smallest and the greatest."
         if count > 1
         else "One mission each.",
         f"Time: with the fitted {found.measure:.1f} s for a measurement; in the last column with the default.",
@@ -93,11 +93,11 @@ def experiment_sheet(found: Findings, table: int | None) -> Sheet:
 
 
 def fit_sheet(fit: Measuring, records: Mapping[int, Record], title: str = "") -> Sheet:
-    """The one free number, and what it leaves.
+    """The one free parameter, and the residuals.
 
     Args:
-      records: of each experiment the one that is shown.
-      title: put before the fitted number.
+      records: the record shown for each experiment.
+      title: text before the fitted number.
     """
     rows = []
     for item in EXPERIMENTS:
@@ -131,14 +131,14 @@ def fit_sheet(fit: Measuring, records: Mapping[int, Record], title: str = "") ->
         (tuple(rows),),
         (
             f"Least squares over {fit.missions} missions of the four experiments with a published time; of the "
-            f"missions shown, {rms / 60:.1f} min are left (root mean square). Nothing else is fitted.",
-            "Alone: what the experiment by itself would have a measurement take.",
+            f"missions shown, {rms / 60:.1f} min remain (root mean square). Nothing else is fitted.",
+            "Alone: the duration of a measurement according to this experiment alone.",
         ),
     )
 
 
 def account_sheet(found: Findings, numbers: Sequence[int]) -> Sheet:
-    """What the missions that are shown spent their time on."""
+    """How the missions shown spent their time."""
     rows = []
     for kind in KINDS:
         cells = [kind]
@@ -157,7 +157,7 @@ def account_sheet(found: Findings, numbers: Sequence[int]) -> Sheet:
 
 
 def table_1_sheet(found: Findings) -> Sheet:
-    """What each strategy passed and measured, beside what the paper says of the works that it stands for."""
+    """What each strategy passed and measured, beside the paper's statements about the works that it represents."""
     rows = []
     for name, (works, said) in TABLE_1.items():
         ours = [found.table_1[name, scene] for scene in SCENES]
@@ -171,9 +171,9 @@ def table_1_sheet(found: Findings) -> Sheet:
         columns,
         (tuple(rows),),
         (
-            "O: its mission in the scene whose only way leads there reached the goal; X: it did not. M: that class is "
+            "O: its mission in the scene whose only path leads there reached the goal; X: it did not. M: that class is "
             "where it should be, in the map that the mission ended with; U: it is not. “Both”: a bump, then a gate.",
-            "All strategies here have one and the same camera and map, so that they measure alike. The robots of the "
+            "All strategies here have the same camera and map, so they measure alike. The robots of the "
             "other works have other sensors: hence U in the paper.",
         ),
     )
@@ -204,7 +204,7 @@ def table_2_sheet(verified: Sequence[Verified]) -> Sheet:
             f"{1e3 * each.margin:.0f}",
             f"{1e3 * each.least_margin:.0f}",
         ))  # fmt: skip
-    columns = ("primitive", "paper's\ns", "ours\ns", "carries", "off\nmm", "success\n%", "ZMP\nmm", "at worst\nmm")
+    columns = ("primitive", "paper's\ns", "ours\ns", "carries", "error\nmm", "success\n%", "ZMP\nmm", "worst\nmm")
     trials = verified[0].trials if verified else 0
     return Sheet(
         "Table 2: the primitives, simulated",
@@ -212,15 +212,15 @@ def table_2_sheet(verified: Sequence[Verified]) -> Sheet:
         (tuple(rows),),
         (
             f"Success, with Wilson's interval, in {trials} trials each with other friction, masses, bump heights and "
-            "gate positions (the mild set of `jaxbiped primitives`). Off: where it ends undisturbed, less what was "
-            f"asked for. Paper: for {100 * CELL:.0f} cm, 45 degrees, or one edge; ours as long as what it carries.",
-            "ZMP: least margin of the zero moment point within the soles, undisturbed and at worst on the mild set.",
+            "gate positions (the mild set of `jaxbiped primitives`). Error: undisturbed end pose minus the "
+            f"request. Paper: for {100 * CELL:.0f} cm, 45 degrees, or one edge; ours for its own displacement.",
+            "ZMP: smallest margin of the zero moment point within the soles, undisturbed and worst on the mild set.",
         ),
     )
 
 
 def mishap_sheet(endings: Sequence[Ending]) -> Sheet:
-    """Missions that cannot go well."""
+    """Missions that cannot succeed."""
     rows = [
         (
             each.mishap.what,
@@ -232,4 +232,4 @@ def mishap_sheet(endings: Sequence[Ending]) -> Sheet:
         for each in endings
     ]
     columns = ("what is wrong", "ended", "names it", "distance\ncm", "measurements")
-    return Sheet("Missions that cannot go well", columns, (tuple(rows),))
+    return Sheet("Missions that cannot succeed", columns, (tuple(rows),))

@@ -1,4 +1,4 @@
-"""What the robot measures: points, landmarks and its own motion.
+"""The robot's measurements: points, landmarks and its own motion.
 
 Functions are written for one arena; the mission maps them.
 """

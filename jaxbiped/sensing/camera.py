@@ -1,4 +1,4 @@
-"""The stereo camera on the robot: its numbers, its rays and where it sits.
+"""The stereo camera on the robot: its parameters, its rays and its pose.
 
 Camera frame: x right, y down, z along the optical axis, origin at the left camera's centre. Rays have z = 1, so that
 their parameter is the depth, and disparity = focal * baseline / depth. (Paper, 3.1: Bumblebee 2, 512 x 384, 12 cm.)
@@ -19,12 +19,12 @@ from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.geometry.small import matrix, product
 
-LEAST = 1e-6  # of what must be above 0 in a camera
+LEAST = 1e-6  # smallest value of positive parameters
 
 
 @dataclass(frozen=True)
 class ImageSpec:
-    """Pixels of the image and the rays that stand for them; static, since it sets array shapes.
+    """Pixels of the image and the rays that represent them; static, since it sets array shapes.
 
     Rays go through the centres of equal blocks of pixels. Pixel (0, 0) has its centre at (0, 0) and the
     principal point is the middle of the image.
@@ -47,12 +47,12 @@ class ImageSpec:
 
     @property
     def axis_sizes(self) -> dict[str, int]:
-        """Sizes of the axes of what has a value for each ray."""
+        """Axis sizes of arrays with a value for each ray."""
         return {"rows": self.rows, "columns": self.columns}
 
     @property
     def stride(self) -> tuple[float, float]:
-        """Pixels from a ray to the next, across and down."""
+        """Pixels from one ray to the next, across and down."""
         return self.width / self.columns, self.height / self.rows
 
     @property
@@ -62,24 +62,24 @@ class ImageSpec:
 
     @cached_property
     def u(self) -> Float[np.ndarray, "columns"]:
-        """[px] column of each ray."""
+        """[px] Column of each ray."""
         return ((np.arange(self.columns) + 0.5) * self.stride[0] - 0.5).astype(np.float32)
 
     @cached_property
     def v(self) -> Float[np.ndarray, "rows"]:
-        """[px] row of each ray."""
+        """[px] Row of each ray."""
         return ((np.arange(self.rows) + 0.5) * self.stride[1] - 0.5).astype(np.float32)
 
     @property
     def centre(self) -> tuple[float, float]:
-        """[px] principal point (u, v)."""
+        """[px] Principal point (u, v)."""
         return (self.width - 1) / 2, (self.height - 1) / 2
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Camera:
-    """What a sweep may change of the camera. All traced."""
+    """The parameters of the camera that a sweep may change. All traced."""
 
     focal: Float[Array, "*B"]  # [px]
     baseline: Float[Array, "*B"]  # [m]
@@ -94,7 +94,7 @@ class Camera:
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Mount:
-    """Where the camera sits at a moment, as the robot believes: on its vertical plane of symmetry, pitched down."""
+    """The believed pose of the camera at a moment: in the robot's vertical plane of symmetry, pitched down."""
 
     pitch: Float[Array, "*B"]  # [rad]
     height: Float[Array, "*B"]  # [m]
@@ -102,10 +102,10 @@ class Mount:
 
 
 def check_camera(camera: Camera) -> None:
-    """Check the numbers of a camera, where they are concrete.
+    """Check the parameters of a camera, if they are concrete.
 
     Raises:
-      InputError: a number that is not finite; no focal length, baseline, or range of disparities above 0.
+      InputError: a number that is not finite; a focal length, baseline, or range of disparities that is not above 0.
     """
     for field in fields(camera):
         above = field.name in ("focal", "baseline", "max_disparity")
@@ -113,7 +113,7 @@ def check_camera(camera: Camera) -> None:
 
 
 def mount(camera: Camera, look: Bool[Array, ""] | bool = False, squat: Bool[Array, ""] | bool = False) -> Mount:
-    """Where the camera sits: `look` tilts it to the feet, `squat` lowers it."""
+    """The camera's pose: `look` tilts it to the feet, `squat` lowers it."""
     return Mount(
         pitch=jnp.where(look, camera.look_pitch, camera.pitch),
         height=camera.height - jnp.where(squat, camera.squat_drop, 0.0),

@@ -1,8 +1,8 @@
 """The edge of a bump as a line, measured from the points of a view to within millimetres (paper, 2.4).
 
-The grid tells where an edge is to half a cell; a foot must meet it within a few millimetres. So the line between the
-points of the ground that the robot stands on and those one level higher or lower is fitted, and kept in the robot's
-frame: what matters is how far it lies ahead, whatever the robot believes of its place in the world.
+The grid locates an edge to half a cell; a foot must meet it within a few millimetres. So the line between the points of
+the ground that the robot stands on and those one level higher or lower is fitted, and kept in the robot's frame: its
+distance ahead matters, not the robot's believed position in the world.
 """
 
 from __future__ import annotations
@@ -18,21 +18,21 @@ from jaxbiped.geometry.small import matrix, product
 from jaxbiped.sensing.camera import Mount
 from jaxbiped.sensing.view import View
 
-REACH = 0.06  # [m] points this far off the line, on both sides, are looked at: the next edge is further
-HALF_WIDTH = 0.09  # [m] half of the edge's piece that is measured: what the two feet stand before
-# [m] width of the transition that is fitted, round by round: it finds an edge from 3 cm off, and ends at about the
+REACH = 0.06  # [m] points up to this far from the line, on both sides, are used: the next edge is farther
+HALF_WIDTH = 0.09  # [m] half the width of the measured piece of the edge: that in front of the two feet
+# [m] width of the fitted transition, round by round: it finds an edge from 3 cm away, and ends at about the
 # distance between two rays on the ground, so that the line lies in the middle of the gap between the two sorts
 WIDTHS = (0.015, 0.015, 0.010, 0.010, 0.007, 0.005, 0.004, 0.004)
-SOFT = 0.25  # share of the rise, at both ends, in which a height counts as plain ground
-STRAY = 0.4  # share of the rise beyond it, in which a height counts at all
-TRIMMED_FROM = 4  # round from which on rays that lie clearly on the wrong side do not count, as those beside a corner
-LEAST = 8.0  # rays wanted on each side of the line
+SOFT = 0.25  # share of the rise, at both ends, within which a height counts as plain ground
+STRAY = 0.4  # share of the rise beyond it, within which a height still counts
+TRIMMED_FROM = 4  # round from which rays clearly on the wrong side, as beside a corner, do not count
+LEAST = 8.0  # rays required on each side of the line
 MOST_WRONG = 0.15  # share of the rays that may lie on the wrong side
-CLEAR = 0.010  # [m] from the line on, a ray on the wrong side is wrong
-# What a view is off by itself: rays are about 11 mm apart on the ground, and a row of them that runs along the edge
-# tells no more than that it lies between this row and the next.
+CLEAR = 0.010  # [m] distance from the line beyond which a ray on the wrong side counts as wrong
+# The error of a single view: rays are about 11 mm apart on the ground, and a row of them along the edge
+# only shows that the edge lies between this row and the next.
 FLOOR_DISTANCE, FLOOR_ANGLE = 0.003, 0.02  # [m, rad] standard deviations
-PRIOR_DISTANCE, PRIOR_ANGLE = 0.03, 0.2  # [m, rad] of a line read off the grid
+PRIOR_DISTANCE, PRIOR_ANGLE = 0.03, 0.2  # [m, rad] of a line read from the grid
 GATE = 16.0  # squared Mahalanobis distance beyond which two lines are not the same
 
 
@@ -41,10 +41,10 @@ GATE = 16.0  # squared Mahalanobis distance beyond which two lines are not the s
 class Edge:
     """A line on the ground where it rises or falls by a level, in the robot frame of the moment."""
 
-    distance: Float[Array, "*B"]  # [m] from the robot's axis, along the normal; negative: it lies behind
-    angle: Float[Array, "*B"]  # [rad] of the normal, which points across the edge, from forward
+    distance: Float[Array, "*B"]  # [m] from the robot's axis, along the normal; negative: behind
+    angle: Float[Array, "*B"]  # [rad] of the normal, which points across the edge, relative to forward
     cov: Float[Array, "*B 2 2"]  # of both [m, rad]
-    rise: Int[Array, "*B"]  # levels that the ground beyond lies higher: -1 or 1
+    rise: Int[Array, "*B"]  # levels by which the ground beyond is higher: -1 or 1
     known: Bool[Array, "*B"]
 
 
@@ -55,12 +55,12 @@ def unknown() -> Edge:
 
 
 def prior_cov() -> Float[Array, "2 2"]:
-    """Uncertainty of a line that is read off the grid."""
+    """Uncertainty of a line read from the grid."""
     return jnp.diag(jnp.array([PRIOR_DISTANCE**2, PRIOR_ANGLE**2], jnp.float32))
 
 
 def predict(edge: Edge, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> Edge:
-    """The edge after the robot has moved by (dx, dy, dyaw) [m, m, rad], counted in the frame before, with variances."""
+    """The edge after the robot has moved by (dx, dy, dyaw) [m, m, rad] in the frame before, with these variances."""
     dx, dy, dyaw = moved
     cos, sin, one, zero = jnp.cos(edge.angle), jnp.sin(edge.angle), jnp.ones(()), jnp.zeros(())
     F = matrix(((one, dx * sin - dy * cos), (zero, one)))
@@ -74,7 +74,7 @@ def predict(edge: Edge, moved: Float[Array, "3"], variances: Float[Array, "3"]) 
 
 
 def fuse(old: Edge, new: Edge) -> Edge:
-    """Two measurements of an edge as one. Where they disagree, or only one is known, the newer or the known one."""
+    """Fuse two measurements of an edge. If they disagree, the newer; if only one is known, that one."""
     off = jnp.stack([new.distance - old.distance, wrap_angle(new.angle - old.angle)])
     S_inverse = inverse(old.cov + new.cov)
     same = jnp.sum(off * jnp.sum(S_inverse * off, axis=1)) <= GATE
@@ -95,23 +95,23 @@ def fuse(old: Edge, new: Edge) -> Edge:
 def measure(
     view: View, about: Edge, aside: Float[Array, ""] | float, eye: Mount, level_height: Float[Array, ""] | float
 ) -> Edge:
-    """The edge near a line `about`, from the points of one view that was brought level (`mapping.level_view`).
+    """The edge near a line `about`, from the points of one levelled view (`mapping.level_view`).
 
-    A logistic regression with a fixed, shrinking width: of all lines the one that best parts points of the robot's own
-    level from those `about.rise` levels higher. Heights in between, as of a bump's face seen from below, pull the line
-    to themselves. Ground behind a falling edge is hidden; its points count where their ray passed the upper level, so
-    that the first of them bounds the edge as closely as the last before it. The paper says that the direction of the
-    edge is measured (2.4), not how.
+    A logistic regression with a fixed, shrinking width: it finds the line that best separates points of the robot's own
+    level from those `about.rise` levels higher. Heights in between, as of a bump's face seen from below, attract the
+    line. Ground behind a falling edge is hidden; its points count where their ray passed the upper level, so that the
+    first of them bounds the edge as closely as the last before it. The paper says that the direction of the edge is
+    measured (2.4), but not how.
 
     Args:
-      about: where to look for it; its `known` and `cov` are not read.
-      aside: [m] to the left of the robot, along the edge, of the middle of the piece that is measured.
-      eye: where the camera sits.
+      about: where to search; its `known` and `cov` are not read.
+      aside: [m] lateral position, to the left of the robot along the edge, of the middle of the measured piece.
+      eye: pose of the camera.
       level_height: [m].
 
     Returns:
-      The edge, with the uncertainty of this view alone; not known where too few points lie on either side, or too
-      many on the wrong one.
+      The edge, with the uncertainty of this view alone; not known if too few points lie on either side, or too many on
+      the wrong one.
     """
     height = about.rise * level_height
     toward_eye = jnp.where((about.rise < 0) & (view.z < 0), view.z / (view.z - eye.height), 0.0)
@@ -160,6 +160,6 @@ def measure(
 
 
 def inverse(m: Float[Array, "2 2"]) -> Float[Array, "2 2"]:
-    """Of a 2 x 2 matrix."""
+    """Inverse of a 2 x 2 matrix."""
     determinant = m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]
     return matrix(((m[1, 1], -m[0, 1]), (-m[1, 0], m[0, 0]))) / determinant

@@ -1,8 +1,8 @@
-"""Which landmarks a view shows, and where it measures them.
+"""The landmarks visible in a view, and their measured positions.
 
-Measuring is modelled, not imaged: a landmark that is in both images, in range and not behind a box or terrain is
-found, and its centre is off by a normal error that grows with range. Correspondence is known (paper, 2, condition 2:
-sizes and places of landmarks are known). The yaw of a square, known modulo 90 degrees, is not used. On terrain a
+Measurement is modelled, not imaged: a landmark that is in both images, in range and not behind a box or terrain is
+found, and its centre has a normal error that grows with range. Correspondence is known (paper, 2, condition 2: sizes
+and positions of landmarks are known). The yaw of a square, known modulo 90 degrees, is not used. On terrain a
 landmark lies at the height of the ground.
 """
 
@@ -54,11 +54,11 @@ def sight(
 ) -> Sightings:
     """Landmarks of one arena as seen from the true `pose`; the channel LANDMARK of the view's `seed` is used.
 
-    Unseen ones are at the origin; none is seen from a pose that is not finite. Under `jit` what is no `SQUARE` is a
-    circle.
+    Unseen ones are at the origin; none is seen from a pose that is not finite. Under `jit`, any kind that is not
+    `SQUARE` is a circle.
 
     Raises:
-      InputError: an argument of another rank, shape or type, an unknown kind, a camera that `check_camera` refuses,
+      InputError: an argument of another rank, shape or type, an unknown kind, a camera that `check_camera` rejects,
         NaN in `noise`.
     """
     check_camera(camera)

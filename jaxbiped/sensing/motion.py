@@ -1,7 +1,7 @@
-"""Visual odometry of the ray-cast sensor: what a camera tells of the robot's own motion from one view to the next.
+"""Visual odometry of the ray-cast sensor: the robot's own motion from one view to the next.
 
-`stereo.tracking` measures it in pictures. Here is a model of that: it takes points that both views show, and
-has errors of the size that rendered pictures have.
+`stereo.tracking` measures it in pictures. This is a model of it: it uses points that both views show, and has errors
+of the size found in rendered pictures.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
 from jaxbiped.sensing.view import Motion, View
 
 VISUAL = 6  # channel of a view's seed
-LEAST_SHARE = 1e-4  # of the image, in both views: keeps the model's division finite where nothing is
+LEAST_SHARE = 1e-4  # of the image, in both views: keeps the model's division finite if nothing is
 
 
 @jax.tree_util.register_dataclass
@@ -35,7 +35,7 @@ class VisualNoise:
     failure: Float[Array, "*B"]
 
 
-SHARE = 0.1  # of the image: where the standard deviations of `VisualConfig` hold
+SHARE = 0.1  # of the image: share for which the standard deviations of `VisualConfig` hold
 
 
 def nothing() -> Motion:
@@ -56,13 +56,13 @@ def track(
     max_range: Float[Array, ""] | float,
     seed: UInt32[Array, ""],
 ) -> Motion:
-    """The motion from the true pose `before`, where the last view was taken, to the true `pose` of this one.
+    """The motion from the true pose `before`, of the last view, to the true `pose` of this one.
 
     Modelled, not imaged. The channel VISUAL of this view's `seed` is used.
 
     Args:
-      view: of this one; its points are textured, since they were matched.
-      at: how the camera was held at the last view.
+      view: this view; its points are textured, since they were matched.
+      at: the camera's pose on the robot in the last view.
       max_range: [m] from the camera; points beyond are not measured.
     """
     share = overlap(view, pose, before, at, camera, image, max_range)
@@ -86,9 +86,9 @@ def overlap(
     image: ImageSpec,
     max_range: Float[Array, ""] | float,
 ) -> Float[Array, ""]:
-    """Share of the image's pixels whose points lie where the camera at `before` measures them too.
+    """Share of the image's pixels whose points are also measured by the camera at `before`.
 
-    What hides a point from there is not looked for.
+    Occlusion from there is not checked.
     """
     x, y = to_robot(before, *to_world(pose, view.x, view.y))
     z = view.z + pose.z - before.z

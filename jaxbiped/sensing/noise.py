@@ -1,11 +1,11 @@
-"""What stereo matching makes of true disparities: its noise, its holes and its phantoms.
+"""The effects of stereo matching on true disparities: noise, holes and phantoms.
 
-The model that reproduces rendered pairs matched by a semi-global matcher, ray by ray: sub-pixel noise that grows
-with the slope of the surface and is correlated over neighbours, 1/16 px steps, surfaces that one camera cannot see,
-surfaces nearer than the search range, holes at edges, at grazing incidence, where one image shows a surface wider than
-the other, and on plain texture, foreground fattening at edges, and clumped phantoms where nothing can be matched.
+The model reproduces, ray by ray, rendered pairs matched by a semi-global matcher: sub-pixel noise that grows with the
+slope of the surface and is correlated over neighbours, 1/16 px steps, surfaces that one camera cannot see, surfaces
+nearer than the search range, holes at edges, at grazing incidence, where one image shows a surface wider than the
+other, and on plain texture, foreground fattening at edges, and clumped phantoms where nothing can be matched.
 
-On a plane disparity is an affine function of the pixel. So first differences give the slope of a surface, and second
+On a plane, disparity is an affine function of the pixel. So first differences give the slope of a surface, and second
 differences vanish except at edges: no normals or object numbers are needed.
 """
 
@@ -22,9 +22,9 @@ from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.camera import Camera, ImageSpec
 
 MATCH, PHANTOM, ATTITUDE = 1, 2, 3  # channels of a view's seed
-HIDING_REACH = 128  # [px] how far to the right of a pixel something may hide it
+HIDING_REACH = 128  # [px] largest distance to the right at which something may hide a pixel
 PHANTOM_BLOCK = 12  # [px] size of a clump of phantoms
-LEAST_WIDTH = 1e-2  # [px] in the right image, of one in the left: what turns away further is seen by none
+LEAST_WIDTH = 1e-2  # [px] in the right image, per pixel in the left: surfaces that turn away more are not seen
 
 
 @jax.tree_util.register_dataclass
@@ -49,7 +49,7 @@ class StereoNoise:
     min_contrast: Float[Array, "*B"]
     max_range: Float[Array, "*B"]
     attitude_sd: Float[Array, "*B"]
-    stretch_kept: Float[Array, "*B"] | None = None  # None, as the next: left out of the program
+    stretch_kept: Float[Array, "*B"] | None = None  # None, like the next: left out of the program
     stretch_lost: Float[Array, "*B"] | None = None
 
 
@@ -67,12 +67,12 @@ def match(
     noise: StereoNoise,
     seed: UInt32[Array, ""],
 ) -> Float[Array, "rows columns"]:
-    """Measured disparity [px] of each ray; 0 where none was.
+    """Measured disparity [px] of each ray; 0 where nothing was measured.
 
     Args:
       disparity: the true one [px], with a margin of one ray on all sides; 0 where there is nothing to see.
-      textured: whether what is seen has texture enough.
-      seed: of this view; the channels MATCH and PHANTOM are used.
+      textured: whether the surface has enough texture.
+      seed: seed of this view; the channels MATCH and PHANTOM are used.
     """
     shape = (image.rows, image.columns)
     d = disparity[1:-1, 1:-1]
@@ -86,7 +86,7 @@ def match(
     edge = jnp.maximum(bend_across, bend_along) > noise.edge_jump
     turned = (to_right > 0) & (across > noise.grazing_rise)
     grazing = (jnp.maximum(across, along) > noise.grazing_slope) | turned
-    # What can be matched at all.
+    # What can be matched.
     hidden = hidden_from_right(disparity, image)
     near = d > camera.max_disparity
     # Its noise.
@@ -104,7 +104,7 @@ def match(
     beyond = jnp.where(bend_across > bend_along, beyond_across, beyond_along)
     error = noise.bias + noise.sd * (1 + noise.slope_gain * across) * correlated(match_seed, image, noise.correlation)
     measured = d + jnp.where(swapped, beyond, 0.0) + error
-    # Phantoms: one chance and one wild disparity for each clump.
+    # Phantoms: one chance and one random disparity for each clump.
     clump = counter_rng.bits(counter_rng.fold(seed, PHANTOM), clumps(image))
     wild = 1 + half(clump) * (camera.max_disparity - 1)
     share = jnp.where(near, noise.phantom_near, jnp.where(hidden, noise.phantom_hidden, 0.0))
@@ -118,15 +118,15 @@ def match(
 
 
 def slope(before: Float[Array, "*s"], after: Float[Array, "*s"]) -> Float[Array, "*s"]:
-    """Size of the slope that the differences to the ray before and the ray after agree on; 0 on a peak."""
+    """Magnitude of the slope on which the differences to the previous and the next ray agree; 0 on a peak."""
     return jnp.where(before * after < 0, jnp.minimum(jnp.abs(before), jnp.abs(after)), 0.0)
 
 
 def stretch(across: Float[Array, "*s"], to_right: Float[Array, "*s"]) -> Float[Array, "*s"]:
-    """Share by which one image shows a surface wider than the other: 1 where twice as wide.
+    """Share by which one image shows a surface wider than the other: 1 for twice as wide.
 
-    What is one pixel wide in the left image is 1 - slope wide in the right one, where disparity rises to the right by
-    `across` a pixel, and 1 + slope where it falls. Windows of one size then no longer show the same.
+    One pixel in the left image is 1 - slope wide in the right one where disparity rises to the right by `across` per
+    pixel, and 1 + slope where it falls. Windows of one size then no longer show the same surface.
     """
     return across / jnp.where(to_right > 0, jnp.maximum(1 - across, LEAST_WIDTH), 1.0)
 
@@ -136,16 +136,16 @@ def hidden_from_right(
 ) -> Bool[Array, "rows columns"]:
     """Whether a nearer surface to the right of a pixel covers it in the right image.
 
-    A pixel of column u is seen there at u - d. It is covered when a pixel further to the right is seen there or
+    A pixel of column u is seen there at u - d. It is covered if a pixel farther to the right is seen there or
     left of there.
     """
     window = 1
     seen_at = image.u - disparity[1:-1, 1:-1]
     least = jnp.pad(seen_at[:, 1:], ((0, 0), (0, 1)), constant_values=np.inf)
-    while window * image.stride[0] < HIDING_REACH:  # the least of the next 1, 2, 4, ... columns
+    while window * image.stride[0] < HIDING_REACH:  # the minimum over the next 1, 2, 4, ... columns
         further = jnp.pad(least[:, window:], ((0, 0), (0, min(window, image.columns))), constant_values=np.inf)
-        # Without the barrier XLA fuses the steps, and computes each element's whole tree of minima by itself; a minimum
-        # that carries NaN along, as `jnp.minimum`, is four times slower.
+        # Without the barrier, XLA fuses the steps and computes each element's tree of minima separately; a minimum
+        # that propagates NaN, like `jnp.minimum`, is four times slower.
         least, window = jax.lax.optimization_barrier(jnp.where(further < least, further, least)), 2 * window
     return least <= seen_at
 
@@ -166,7 +166,7 @@ def correlated(
 
 
 def clumps(image: ImageSpec) -> UInt32[np.ndarray, "rows columns"]:
-    """Number of the phantom block that each ray lies in."""
+    """Number of the phantom block of each ray."""
     across = image.width // PHANTOM_BLOCK + 1
     return ((image.v // PHANTOM_BLOCK)[:, None] * across + (image.u // PHANTOM_BLOCK)[None, :]).astype(np.uint32)
 

@@ -1,10 +1,10 @@
-"""How far dead reckoning drifts: the difference between the motion that was asked for and the one that happened.
+"""Drift of dead reckoning: the difference between requested and actual motion.
 
 A random walk: variances grow with the distance walked and the angle turned, so that ten steps of 5 cm drift like one of
-50 cm. The paper gives no figures. The default yaw error makes ten simulated straight steps end 1.9 degrees off in one
-standard deviation (a single one 0.18 degrees, a step over a bump the same), and with it about 9 mm to the side; what
-translation adds by itself is 0.1 mm a step in simulation, and is set larger here, as shoes and floors are
-worse. In simulation the drift is mostly a steady creep of one sign; here it has mean zero, as if calibrated on average.
+50 cm. The paper gives no figures. With the default yaw error, ten simulated straight steps end with a standard
+deviation of 1.9 degrees (a single one 0.18 degrees, a step over a bump the same), and thereby about 9 mm to the side;
+translation by itself adds 0.1 mm per step in simulation, and is set larger here, since shoes and floors are worse. In
+simulation the drift is mostly a steady creep of one sign; here it has mean zero, as if calibrated on average.
 """
 
 from __future__ import annotations
@@ -41,12 +41,12 @@ Displacement = tuple[Float[Array, ""], Float[Array, ""], Float[Array, ""]]
 def drift(
     displacement: Displacement, noise: OdometryNoise, seed: UInt32[Array, ""]
 ) -> tuple[Displacement, Float[Array, "3"]]:
-    """A displacement (dx, dy, dyaw) [m, m, rad] in the robot frame with its error, and the variances of that.
+    """A displacement (dx, dy, dyaw) [m, m, rad] in the robot frame with its error, and the error's variances.
 
-    Read it as what odometry counted of a true motion, or as what became of an intended one. The error's axes are
-    those of the robot frame before the step; no motion, no error. The variances [m^2, m^2, rad^2] are what
-    `localisation.predict` wants. The channel ODOMETRY of `seed` is used. Without any motion there is no derivative:
-    the error grows with the square root of the way.
+    The result is what odometry counted for a true motion, or the actual motion for an intended one. The error's axes
+    are those of the robot frame before the step; without motion there is no error. The variances [m^2, m^2, rad^2] are
+    those for `localisation.predict`. The channel ODOMETRY of `seed` is used. Without any motion there is no derivative:
+    the error grows with the square root of the distance.
 
     Raises:
       InputError: an argument of another rank, shape or type, a displacement that is not finite, NaN in `noise`.

@@ -18,8 +18,8 @@ from jaxbiped.geometry.boxes import Boxes, covers
 from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.sensing.view import View
 
-LEAST = 1e-6  # [m] of what must be above 0
-MOST_POINTS = 100_000_000  # of a view: what memory holds
+LEAST = 1e-6  # [m] smallest value of positive parameters
+MOST_POINTS = 100_000_000  # in a view: what fits in memory
 
 
 @checked()
@@ -34,17 +34,17 @@ def measure(
 ) -> View:
     """Points of one whole arena in the robot frame of the true `pose`; all arguments after it are static.
 
-    On a lattice of `spacing` [m] over the area `size_xy` [m] there is in each column one point on the ground, and one
-    in each other level that a box, or terrain, fills at least in part; where a hole is, there is none. Columns are
-    centres of squares, so that none lies on the edge of a cell of a pitch that `spacing` divides.
+    On a lattice of `spacing` [m] over the area `size_xy` [m], each column has one point on the ground, and one in each
+    other level that a box, or terrain, fills at least in part; holes have none. Columns are centres of squares, so that
+    none lies on the edge of a cell of a pitch that `spacing` divides.
 
     Args:
       level_height: [m] between the points inside boxes; level l is about l times that.
       levels: 0 to levels - 1; boxes above (higher than any head) have no points there.
-      weight: [px] of each point; the one on the ground, which supports, has twice that.
+      weight: [px] weight of each point; the one on the ground, which supports, has twice that.
 
     Returns:
-      `columns * (1 + levels)` points; weight 0 where a level is empty, and everywhere when the pose is not finite.
+      `columns * (1 + levels)` points; weight 0 where a level is empty, and everywhere if the pose is not finite.
 
     Raises:
       InputError: an argument of another rank, shape or type; a size, spacing, height or number of levels that is not
@@ -67,9 +67,9 @@ def measure(
         known = ground[None] != HOLE
     level = (np.arange(levels, dtype=np.float32) * np.float32(level_height))[:, None]
     half = level_height / 2
-    inside_floor = level < ground - half  # the ground itself has a point of its own, and is alone in its level
+    inside_floor = level < ground - half  # the ground itself has its own point, and is alone in its level
     inside_overhead = (level + half > ceiling) & (level - half <= cover)
-    # A level that a box fills in part is measured where the box begins or ends.
+    # A level that is partly filled by a box is measured where the box begins or ends.
     height = jnp.where(inside_floor, level, jnp.clip(level, ceiling, jnp.maximum(ceiling, cover)))
     z = jnp.concatenate([ground[None], height]) - pose.z
     there = jnp.concatenate([known, inside_floor | inside_overhead])
@@ -83,7 +83,7 @@ def measure(
 def heights(
     boxes: Boxes, x: Float[Array, "N"], y: Float[Array, "N"], floor: float = 0.0
 ) -> tuple[Float[Array, "N"], Float[Array, "N"], Float[Array, "N"]]:
-    """Height [m] of the ground (else `floor`), lowest bottom (else inf), highest top (else -inf) of what hangs there.
+    """Height [m] of the ground (else `floor`), lowest bottom (else inf) and highest top (else -inf) of hanging boxes.
 
     Ground and ceiling are those of `geometry.boxes`; as a loop, since XLA would search the boxes again for each level.
     """

@@ -1,6 +1,6 @@
 """How well the camera measures, by name: `ideal`, `rendered` (pairs rendered and matched), `real`.
 
-They live here so that an installed wheel has them; `configs/sensors/` has the same values with an explanation of each.
+They are in the code so that an installed wheel has them; `configs/sensors/` has the same values with explanations.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from jaxbiped.sensing.config import LandmarkConfig, NoiseConfig
 
 
 class RayConfig(Model):
-    """How many rays stand for a picture, which both must divide."""
+    """Number of rays that represent a picture, whose sides they must divide."""
 
     columns: int = Field(ge=4)
     """Rays across the image."""
@@ -25,14 +25,14 @@ class RayConfig(Model):
 
 
 class SensorConfig(Model):
-    """A sensor file: noise of the points and of the landmarks, and perhaps how many rays it takes."""
+    """A sensor file: noise of the points and of the landmarks, and optionally the number of rays it requires."""
 
     stereo: NoiseConfig = NoiseConfig()
-    """Of stereo matching."""
+    """Noise of stereo matching."""
     landmarks: LandmarkConfig = LandmarkConfig()
-    """Of finding landmarks."""
+    """Noise of landmark detection."""
     rays: RayConfig | None = None
-    """In place of the camera's own, where this is given and they are not."""
+    """Replaces the camera's default rays, if given here and not there."""
 
 
 SOURCES = "bias sd quantum drop_plain drop_edge drop_grazing edge_swap phantom_hidden phantom_near attitude_sd"
@@ -50,7 +50,7 @@ PRESETS = {
 
 
 def sensor_preset(name: str) -> SensorConfig:
-    """The preset of this name, or the sensor file of this path; raises `InputError` when it is neither."""
+    """The preset of this name, or the sensor file at this path; raises `InputError` if it is neither."""
     if not isinstance(name, str):
         raise InputError(f"must be str, not {type(name).__name__}", field="name")
     if name in PRESETS:

@@ -31,16 +31,16 @@ def measure(
 ) -> View:
     """One measurement in one arena from the true `pose` (z: height of the supporting surface).
 
-    The robot's true attitude is off by a roll and a pitch [rad]: `attitude` where it is known, as of a simulated
-    robot, else drawn by the view's seed. Points are reprojected as if it were upright (`View`). `look` tilts the
-    camera to the feet, `squat` lowers it. Rays that measured nothing, or a range beyond `noise.max_range`, have weight
-    0 and lie at the origin; so do all when the pose is not finite.
+    The robot's true attitude deviates by a roll and a pitch [rad]: `attitude` if it is known, as for a simulated robot,
+    else drawn from the view's seed. Points are reprojected as if it were upright (`View`). `look` tilts the camera to
+    the feet, `squat` lowers it. Rays without a measurement, or with a range beyond `noise.max_range`, have weight 0 and
+    are at the origin; so are all if the pose is not finite.
 
-    What a ray meets is found by comparing bits, so derivatives do not tell how points move with the pose or the boxes:
-    use differences of measurements with one seed, or `measure_oracle`.
+    Ray hits are found by comparing bits, so derivatives do not show how points move with the pose or the boxes: use
+    differences of measurements with one seed, or `measure_oracle`.
 
     Raises:
-      InputError: an argument of another rank, shape or type, a camera that `check_camera` refuses, NaN in `noise`.
+      InputError: an argument of another rank, shape or type, a camera that `check_camera` rejects, NaN in `noise`.
     """
     check_camera(camera)
     at = mount(camera, look, squat)
@@ -63,7 +63,7 @@ def cast(
     box_marks: Bool[Array, "M"],
     floor_mark: Bool[Array, ""],
 ) -> Int32[Array, "padded_rows padded_columns"]:
-    """What each ray, and each of a margin of one around, meets: inverse depth [1/m] and a mark (`geometry.rays.key`).
+    """The hit of each ray, and of a margin of one ray around: inverse depth [1/m] and a mark (`geometry.rays.key`).
 
     Inverse depth is along the optical axis, and 0 where a ray leaves the arena: there is nothing beyond its rectangle.
     """
@@ -89,11 +89,11 @@ def reproject(
     image: ImageSpec,
     max_range: Float[Array, ""] | float,
 ) -> View:
-    """Points in the robot frame of disparities [px] (0: not measured), for a robot that stands upright."""
-    # All from the quotient, in flat vectors: XLA then keeps it, and neither matches again nor shuffles for each result.
+    """Points in the robot frame for disparities [px] (0: not measured), for a robot that stands upright."""
+    # All from the quotient, in flat vectors: XLA then keeps it, and does not match or shuffle again for each result.
     depth = (camera.focal * camera.baseline / disparity).reshape(-1)
     x, y = (values.reshape(-1) for values in jnp.meshgrid(*rays(camera, image)))
-    valid = depth * jnp.sqrt(1 + x * x + y * y) <= max_range  # false for the inf and NaN of what was not measured
+    valid = depth * jnp.sqrt(1 + x * x + y * y) <= max_range  # false for the inf and NaN of unmeasured rays
     cos, sin = jnp.cos(at.pitch), jnp.sin(at.pitch)
     points = (at.forward + depth * (cos - sin * y), -depth * x, at.height - depth * (sin + cos * y))
     return View(*(jnp.where(valid, axis, 0.0) for axis in points), weight=jnp.where(valid, image.pixels_per_ray, 0.0))

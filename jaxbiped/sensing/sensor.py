@@ -1,4 +1,4 @@
-"""What every source of points is."""
+"""The protocol of sources of points."""
 
 from __future__ import annotations
 

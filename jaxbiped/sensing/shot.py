@@ -1,4 +1,4 @@
-"""What one stereo measurement is."""
+"""The result of one stereo measurement."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from jaxbiped.sensing.view import Sightings, View
 
 @dataclass(frozen=True)
 class Shot:
-    """One measurement: what the robot gets of it, and the pictures that it comes from."""
+    """One measurement: the robot's data, and the pictures that they come from."""
 
     view: View  # [N]
     sightings: Sightings  # [L]

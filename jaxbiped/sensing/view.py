@@ -1,4 +1,4 @@
-"""What one measurement gives: the same thing from every sensor."""
+"""The result of one measurement: the same type from every sensor."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from jaxtyping import Array, Bool, Float
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class View:
-    """Points of one measurement in the robot frame of the moment, as the robot believes its attitude to be.
+    """Points of one measurement in the robot frame of the moment, according to the robot's believed attitude.
 
-    The camera's true attitude may be off by a degree; the points then lie tilted, and `mapping` levels them.
+    The camera's true attitude may differ by a degree; the points are then tilted, and `mapping` levels them.
     """
 
     x: Float[Array, "*B N"]  # [m] forward
     y: Float[Array, "*B N"]  # [m] left
     z: Float[Array, "*B N"]  # [m] up, from the supporting surface under the robot
-    weight: Float[Array, "*B N"]  # pixels that the point stands for; 0 where nothing was measured
+    weight: Float[Array, "*B N"]  # pixels that the point represents; 0 where nothing was measured
 
 
 @jax.tree_util.register_dataclass
@@ -31,13 +31,13 @@ class Sightings:
     y: Float[Array, "*B L"]  # [m] left, robot frame
     sd: Float[Array, "*B L"]  # [m] standard deviation of x and of y
     seen: Bool[Array, "*B L"]
-    motion: Motion | None = None  # since the view before; only where the robot goes by it
+    motion: Motion | None = None  # since the previous view; only if the robot uses it
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Motion:
-    """Where the robot of this view stands in the robot frame of the view before, as pictures alone tell it."""
+    """The pose of the robot in the robot frame of the previous view, from pictures alone."""
 
     x: Float[Array, "*B"]  # [m] forward
     y: Float[Array, "*B"]  # [m] left

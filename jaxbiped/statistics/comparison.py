@@ -1,4 +1,4 @@
-"""Strategies against each other on the same arenas, overall and in strata."""
+"""Compare strategies on the same arenas, overall and in strata."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from jaxbiped.statistics.metric_differences import corrected_metrics, metric_mea
 from jaxbiped.statistics.paired import PairedMetric, holm, metric_difference, success_difference
 from jaxbiped.statistics.schema import CODES, metric_columns, ordered, ordered_families, validate
 
-OWN = 1  # of the seed of bootstraps that are of one strategy alone
-QUESTION = ("bump_aware", "floor_only")  # the pair that the project is about
+OWN = 1  # stream of the seed for bootstraps of a single strategy
+QUESTION = ("bump_aware", "floor_only")  # the pair behind the project's question
 
 
 @dataclass(frozen=True)
@@ -41,9 +41,9 @@ class StrategySummary:
     n: int  # arenas
     success: Estimate
     reachable: Estimate  # share of arenas with an oracle plan for this strategy
-    success_of_reachable: Estimate  # success on those: what is missing is sensing's and walking's, not planning's
+    success_of_reachable: Estimate  # success on those: failures come from sensing and walking, not from planning
     codes: tuple[int, ...]  # missions by how they ended, in the order of CODES
-    distance: Estimate  # [m] mean over its own reached missions: other arenas than another strategy's. It has an
+    distance: Estimate  # [m] mean over its own reached missions, whose arenas differ between strategies. It has an
     # interval over all arenas; in families and thirds there are too many of them to compute
     time: Estimate  # [s] the same
     metrics: dict[str, Estimate] = field(default_factory=dict)  # of each other column: mean over missions that have it
@@ -51,7 +51,7 @@ class StrategySummary:
 
 @dataclass(frozen=True)
 class PairComparison:
-    """Two strategies on the arenas of one stratum that both have a row for. Differences are first minus second."""
+    """Two strategies on the arenas of one stratum for which both have a row. Differences are first minus second."""
 
     stratum: Stratum
     first: str
@@ -66,11 +66,11 @@ class PairComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Everything that a report says about one sweep point."""
+    """All results that a report gives for one sweep point."""
 
     point: int
-    level: float  # of every interval
-    seed: int  # of the bootstraps
+    level: float  # confidence level of every interval
+    seed: int  # seed of the bootstraps
     resamples: int
     strategies: tuple[str, ...]
     summaries: tuple[StrategySummary, ...]
@@ -79,7 +79,7 @@ class Comparison:
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """The columns beside success, distance and time that strategies were compared by."""
+        """The columns by which strategies were compared, other than success, distance and time."""
         return tuple(self.summaries[0].metrics) if self.summaries else ()
 
     @property
@@ -93,12 +93,12 @@ class Comparison:
         return tuple(dict.fromkeys(item.stratum for item in self.summaries if item.stratum.kind == kind))
 
     def pair(self, first: str, second: str, stratum: Stratum = ALL) -> PairComparison | None:
-        """One pair on one stratum; None where it was not compared."""
+        """One pair on one stratum; None if it was not compared."""
         wanted = (stratum, first, second)
         return next((pair for pair in self.pairs if (pair.stratum, pair.first, pair.second) == wanted), None)
 
     def summary(self, strategy: str, stratum: Stratum = ALL) -> StrategySummary | None:
-        """One strategy on one stratum; None where it has no arenas."""
+        """One strategy on one stratum; None if it has no arenas."""
         return next((item for item in self.summaries if (item.stratum, item.strategy) == (stratum, strategy)), None)
 
 
@@ -124,8 +124,8 @@ def compare(
     Args:
       frame: rows of `schema.SCHEMA`.
       pairs: (first, second) to compare; by default `default_pairs`.
-      seed: of the bootstraps; each one gets its own stream from it.
-      shown: how numbers of metrics are shown, as a manifest says.
+      seed: seed of the bootstraps; each gets its own stream from it.
+      shown: how numbers of metrics are displayed, from the manifest.
     """
     frame = validate(frame).filter(pl.col("point") == point).sort("arena")
     if frame.is_empty():
@@ -151,15 +151,15 @@ def compare_named(
     level: float = 0.95,
     shown: Mapping[str, MetricFormat] | None = None,
 ) -> Comparison:
-    """Compare whatever the column `strategy` names, arena by arena.
+    """Compare the sides named in the column `strategy`, arena by arena.
 
-    Holm's correction runs over all p-values of a table: success, distance and time of all pairs, over all arenas, over
-    all families together, and over all difficulties together. Other metrics are compared over all arenas, the first
-    pair in every stratum, too; they have a correction of their own, so that adding one changes no other p-value.
+    Holm's correction covers all p-values of a table: success, distance and time of all pairs, over all arenas, over
+    all families together, and over all difficulties together. Other metrics are compared over all arenas, and for the
+    first pair also in every stratum; they are corrected separately, so that adding one changes no other p-value.
 
     Args:
-      frame: the columns of `schema.SCHEMA`; a row for each arena and name, at most.
-      names: in the order of tables.
+      frame: the columns of `schema.SCHEMA`, with at most one row per arena and name.
+      names: the names, in the order of tables.
     """
     strategies = tuple(names)
     rng = np.random.default_rng(seed)
@@ -195,7 +195,7 @@ def strata(frame: pl.DataFrame) -> Iterator[tuple[Stratum, pl.DataFrame]]:
         yield Stratum("family", family), frame.filter(pl.col("family") == family)
     difficulty = pl.col("difficulty")
     values = frame.unique("arena")["difficulty"].to_numpy()
-    # Arenas that are equally difficult stay together, so thirds can be unequal, or fewer than three.
+    # Equally difficult arenas stay together, so thirds can be unequal, or fewer than three.
     edges = np.unique(np.quantile(values, [1 / 3, 2 / 3], method="lower"))
     bounds = [-np.inf, *edges, np.inf]
     for low, high in itertools.pairwise(bounds):
@@ -207,10 +207,10 @@ def strata(frame: pl.DataFrame) -> Iterator[tuple[Stratum, pl.DataFrame]]:
 def summarise(
     stratum: Stratum, strategy: str, rows: pl.DataFrame, level: float, of_means: dict[str, int] | None = None
 ) -> StrategySummary:
-    """One strategy's rows of one stratum.
+    """Summarise one strategy's rows in one stratum.
 
     Args:
-      of_means: seed and resamples of the bootstraps of its means; None: they get no intervals.
+      of_means: seed and resamples of the bootstraps of its means; None: means get no intervals.
     """
     reached = rows.filter("success")
     reachable = rows.filter("reachable")
@@ -230,7 +230,7 @@ def summarise(
 
 
 def own_mean(samples: Float[np.ndarray, "n"], level: float, bootstrap: dict[str, int] | None) -> Estimate:
-    """The mean of one strategy's missions, with the interval that paired means have where a bootstrap is asked for."""
+    """The mean over one strategy's missions, with the same kind of interval as paired means if a bootstrap is given."""
     if len(samples) == 0:
         return NOTHING
     if bootstrap is None:
@@ -247,7 +247,7 @@ def compare_pair(
     resamples: int,
     level: float,
 ) -> PairComparison:
-    """Two strategies (name, rows) on the arenas that both have, in the order of the arenas."""
+    """Compare two strategies (name, rows) on the arenas that both have, in the order of the arenas."""
     both, solved = paired(first[1], second[1])
     a, b = both["success"].to_numpy(), both["success_second"].to_numpy()
     metrics = {
@@ -268,7 +268,7 @@ def compare_pair(
 
 
 def paired(first: pl.DataFrame, second: pl.DataFrame) -> tuple[pl.DataFrame, pl.DataFrame]:
-    """The arenas that both have rows for, and of these the ones that both solved, in the order of the arenas.
+    """The arenas for which both have rows, and those of them that both solved, in the order of the arenas.
 
     The second's columns are `success_second`, `distance_second` and `time_second`.
     """
@@ -278,7 +278,7 @@ def paired(first: pl.DataFrame, second: pl.DataFrame) -> tuple[pl.DataFrame, pl.
 
 
 def corrected(pairs: Sequence[PairComparison]) -> tuple[PairComparison, ...]:
-    """The pairs with Holm's p-values, one correction for each kind of stratum."""
+    """The pairs with Holm's p-values, with one correction for each kind of stratum."""
     result = {}
     for kind in ("all", "family", "difficulty"):
         table = [index for index, pair in enumerate(pairs) if pair.stratum.kind == kind]

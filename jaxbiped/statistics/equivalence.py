@@ -1,4 +1,4 @@
-"""Whether two strategies differ by less than a margin, over all arenas and in strata."""
+"""Tests of whether two strategies differ by less than a margin, over all arenas and in strata."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MEASURES = ("success", "distance", "time")
 
 @dataclass(frozen=True)
 class Equivalence:
-    """Two one-sided tests on one measure and one stratum. Differences are first minus second."""
+    """Two one-sided tests for one measure in one stratum. Differences are first minus second."""
 
     stratum: Stratum
     measure: str  # one of MEASURES
@@ -36,7 +36,7 @@ def equivalences(
     """Test each measure that has a margin, on all arenas and on each stratum.
 
     Args:
-      frame: rows of two names in `strategy`.
+      frame: rows with two names in `strategy`.
       margins: measure to margin [fraction], [m] or [s]; above 0, and for success below 1.
 
     Raises:
@@ -63,7 +63,7 @@ def equivalences(
 
 
 def corrected(found: list[Equivalence]) -> tuple[Equivalence, ...]:
-    """With Holm's p-values, one correction for each measure and kind of stratum."""
+    """The tests with Holm's p-values, with one correction for each measure and kind of stratum."""
     tables: dict[tuple[str, str], list[int]] = {}
     for index, item in enumerate(found):
         tables.setdefault((item.measure, item.stratum.kind), []).append(index)

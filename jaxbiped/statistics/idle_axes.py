@@ -1,4 +1,4 @@
-"""Stretches of a swept axis over which nothing changes: every mission is the same at several successive values."""
+"""Ranges of a swept axis over which nothing changes: every mission is the same at several successive values."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import polars as pl
 
 from jaxbiped.statistics.schema import SCHEMA
 
-SAME = 1e-6  # that numbers of two missions may differ by
-# What a mission came to. Costs of plans are not among it: they change with the costs where the way does not.
+SAME = 1e-6  # largest difference between the numbers of equal missions
+# The outcome of a mission. It excludes plan costs, which change with the costs even if the path does not.
 NUMBERS = ("walked", "elapsed", "measurements", "decisions", "goal_distance", "pose_error", "yaw_error")
 
 
@@ -23,27 +23,27 @@ class IdleSpan:
     low: float
     high: float
     values: int  # of the axis, from low to high
-    whole: bool  # whether these are all that it has
+    whole: bool  # whether these are all values of the axis
 
 
 def idle_spans(frame: pl.DataFrame, points: pl.DataFrame, axes: Mapping[str, Sequence[str]]) -> tuple[IdleSpan, ...]:
-    """The stretches of each axis over which no mission changes, whatever the other axes are at.
+    """The ranges of each axis over which no mission changes, at all values of the other axes.
 
     Args:
       frame: rows of `schema.SCHEMA`.
-      points: as `store.read_points` gives them.
+      points: as returned by `store.read_points`.
       axes: the field of each axis, and the fields that change together with it.
     """
     return tuple(itertools.chain(*(spans_of(frame, points, field, axes[field]) for field in axes)))
 
 
 def spans_of(frame: pl.DataFrame, points: pl.DataFrame, field: str, together: Sequence[str]) -> Iterator[IdleSpan]:
-    """Those of one axis."""
+    """The ranges of one axis."""
     others = [name for name in points.columns if name not in ("point", field, *together)]
     key = [*others, "arena", "strategy"]
-    # Metrics are left out: one may be called as a field that is swept.
+    # Metrics are left out: one may have the name of a swept field.
     rows = frame.select(name for name in frame.columns if name in SCHEMA).join(points, on="point")
-    table = rows.unique([field, *key])  # a point of the config's own values may come twice
+    table = rows.unique([field, *key])  # a point with the config's own values may occur twice
     sides = {value: rows for (value,), rows in table.partition_by(field, as_dict=True).items()}
     values = sorted(sides)
     same = [is_same(sides[low], sides[high], key) for low, high in itertools.pairwise(values)]
@@ -56,7 +56,7 @@ def spans_of(frame: pl.DataFrame, points: pl.DataFrame, field: str, together: Se
 
 
 def is_same(one: pl.DataFrame, other: pl.DataFrame, key: Sequence[str]) -> bool:
-    """Whether all missions that both have are the same, and there are any."""
+    """Whether there are missions that both have, and all of them are the same."""
     both = one.join(other, on=key, suffix="_other")
     if both.is_empty():
         return False

@@ -10,19 +10,19 @@ import numpy as np
 from jaxtyping import Float
 from scipy import optimize, stats
 
-BOOTSTRAP_LIMIT = 5_000  # samples; above it BCa's jackknife costs n^2 and the analytic intervals are as good
+BOOTSTRAP_LIMIT = 5_000  # samples; above it, BCa's jackknife costs n^2 and the analytic intervals are as good
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number with its interval. What could not be computed is None, never NaN."""
+    """A number with its interval. Values that could not be computed are None, never NaN."""
 
     estimate: float | None
     low: float | None = None
     high: float | None = None
-    p: float | None = None  # of the two-sided test that the true value is "no difference"
+    p: float | None = None  # p-value of the two-sided test of "no difference"
     p_holm: float | None = None  # `p` corrected for all tests of its table
-    n: int = 0  # samples behind it
+    n: int = 0  # number of samples
     valid: bool = True  # there is an estimate; the interval may still be None
 
 
@@ -30,7 +30,7 @@ NOTHING = Estimate(None, valid=False)
 
 
 def proportion(successes: int, n: int, level: float = 0.95) -> Estimate:
-    """A proportion with Wilson's score interval (Wilson, 1927); nothing where n is 0."""
+    """A proportion with Wilson's score interval (Wilson, 1927); empty if n is 0."""
     if n == 0:
         return NOTHING
     interval = stats.binomtest(successes, n).proportion_ci(level, method="wilson")
@@ -38,7 +38,7 @@ def proportion(successes: int, n: int, level: float = 0.95) -> Estimate:
 
 
 def score_statistic(difference: float, first_only: int, second_only: int, n: int) -> tuple[float, float]:
-    """Tango's score for a hypothetical paired difference: (observed minus expected, its variance) of the count.
+    """Tango's score for a hypothetical paired difference: (observed minus expected count, its variance).
 
     Tango (1998), Statistics in Medicine 17, 891-908: the nuisance parameter is the probability of "second
     only", at its maximum likelihood under the hypothesis.
@@ -56,7 +56,7 @@ def paired_difference(first_only: int, second_only: int, n: int, level: float = 
       first_only, second_only: pairs where only the first, only the second, succeeded.
       n: all pairs, concordant ones included.
 
-    The interval stays inside [-1, 1], needs the discordant counts alone, and keeps its width when both are zero.
+    The interval stays inside [-1, 1], depends only on the discordant counts, and keeps its width when both are zero.
     """
     if n == 0:
         return NOTHING
@@ -67,7 +67,7 @@ def paired_difference(first_only: int, second_only: int, n: int, level: float = 
         return score - side * z * sqrt(max(variance, 0.0))
 
     def limit(side: float) -> float:
-        # The score is 0 / 0 at the estimate itself when nothing is discordant: start a hair beside it.
+        # The score is 0 / 0 at the estimate itself if no pair is discordant: start slightly beside it.
         inner, outer = estimate - side * 1e-12, -side
         if side * inner <= -1 or side * excess(inner, side) >= 0:
             return outer
@@ -81,13 +81,13 @@ def mean_and_median(
 ) -> tuple[Estimate, Estimate]:
     """The mean and the median of samples, each with its BCa bootstrap interval (`scipy.stats.bootstrap`).
 
-    Both come from the same resamples. There is no interval for fewer than three samples, nor for samples that are all
-    equal. Where the median's jackknife is constant (heavy ties) its acceleration is undefined and the interval is the
-    bootstrap's percentiles. Above `BOOTSTRAP_LIMIT` samples the intervals are Student's t for the mean and the
-    binomial order statistics for the median.
+    Both use the same resamples. There is no interval for fewer than three samples, nor if all samples are equal. If the
+    median's jackknife is constant (heavy ties), its acceleration is undefined and the interval is the percentile
+    interval of the bootstrap. Above `BOOTSTRAP_LIMIT` samples the intervals are Student's t for the mean and binomial
+    order statistics for the median.
 
     Args:
-      seed: seeds the resampling, which consumes nothing else.
+      seed: seed of the resampling.
     """
     n = len(samples)
     if n == 0:
@@ -104,7 +104,7 @@ def mean_and_median(
 def mean_estimate(
     samples: Float[np.ndarray, "n"], *, seed: int, resamples: int = 4999, level: float = 0.95
 ) -> Estimate:
-    """The mean alone, as `mean_and_median` has it but for its resamples; a fifth of the time."""
+    """The mean alone, as in `mean_and_median` except for its resamples; takes a fifth of the time."""
     n = len(samples)
     if n == 0:
         return NOTHING
@@ -123,7 +123,7 @@ def mean_estimate(
 def bootstrap(samples: Float[np.ndarray, "n"], seed: int, resamples: int, level: float) -> Float[np.ndarray, "2 2"]:
     """Limits (low, high) of the mean and of the median by BCa."""
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # scipy warns where the acceleration is 0 / 0: answered below
+        warnings.simplefilter("ignore")  # SciPy warns if the acceleration is 0 / 0: handled below
         result = stats.bootstrap(
             (samples,),
             lambda sample, axis: np.stack([np.mean(sample, axis), np.median(sample, axis)]),

@@ -1,4 +1,4 @@
-"""Metrics beside success, distance and time: their means, and differences on the same arenas."""
+"""Metrics other than success, distance and time: their means, and differences on the same arenas."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from jaxtyping import Float
 from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_estimate
 from jaxbiped.statistics.paired import PairedMetric, holm, paired_metric
 
-SECOND = "#second"  # after a column of the second side: no name of a column ends so
-ROUNDING = 1e-6  # of the greater number: what agrees within it is a tie, as sums of floats in another order do
+SECOND = "#second"  # suffix of the second side's columns; no column name ends like this
+ROUNDING = 1e-6  # relative to the greater number: closer values are ties, since sums of floats depend on their order
 
 
 def metric_means(rows: pl.DataFrame, names: Sequence[str]) -> dict[str, Estimate]:
@@ -29,7 +29,7 @@ def metric_means(rows: pl.DataFrame, names: Sequence[str]) -> dict[str, Estimate
 def metric_pairs(
     first: pl.DataFrame, second: pl.DataFrame, names: Sequence[str], *, seed: int, resamples: int, level: float
 ) -> dict[str, PairedMetric]:
-    """Differences (first minus second) of each column on the arenas where both have a number; medians are left out."""
+    """Differences (first minus second) of each column on the arenas where both have a number; without medians."""
     columns = ["arena", *names]
     both = first.select(columns).join(second.select(columns), on="arena", suffix=SECOND).sort("arena")
     found = {}
@@ -43,7 +43,7 @@ def metric_pairs(
 
 
 def without_rounding(first: Float[np.ndarray, "n"], second: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """Differences, first minus second, of which those within the numbers' own rounding are zero."""
+    """Differences, first minus second, with those within rounding set to zero."""
     differences = first - second
     return np.where(np.abs(differences) <= ROUNDING * np.maximum(np.abs(first), np.abs(second)), 0.0, differences)
 
@@ -52,7 +52,7 @@ P = TypeVar("P")
 
 
 def corrected_metrics(pairs: Sequence[P]) -> tuple[P, ...]:
-    """Pairs with Holm's p-values for their metrics: one correction for each kind of stratum."""
+    """Pairs with Holm's p-values for their metrics, with one correction for each kind of stratum."""
     result = list(pairs)
     for kind in dict.fromkeys(pair.stratum.kind for pair in pairs):
         table = [(k, name) for k, pair in enumerate(pairs) if pair.stratum.kind == kind for name in pair.metrics]

@@ -13,7 +13,7 @@ from statsmodels.stats.weightstats import DescrStatsW
 
 from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_and_median, paired_difference, score_statistic
 
-EXACT_LIMIT = 50  # samples up to which the signed-rank test is exact
+EXACT_LIMIT = 50  # largest number of samples for the exact signed-rank test
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class PairedMetric:
 
 
 def mcnemar(first_only: int, second_only: int) -> float:
-    """Two-sided p of McNemar's exact test: the discordant pairs are a fair coin (McNemar, 1947). 1 without any."""
+    """Two-sided p of McNemar's exact test: discordant pairs are a fair coin (McNemar, 1947). 1 without such pairs."""
     discordant = first_only + second_only
     return float(stats.binomtest(first_only, discordant).pvalue) if discordant else 1.0
 
@@ -48,9 +48,9 @@ def success_difference(first: Bool[np.ndarray, "n"], second: Bool[np.ndarray, "n
 def signed_rank(differences: Float[np.ndarray, "n"]) -> float | None:
     """Two-sided p of Wilcoxon's signed-rank test; None without samples.
 
-    Zeros take part in the ranking and are then left out of both sums (Pratt, 1959). Up to `EXACT_LIMIT` samples the
-    test is exact, given the ranks; beyond it is `scipy.stats.wilcoxon`'s normal approximation, corrected for ties.
-    Differences that are all zero say nothing against "no difference": p is 1.
+    Zeros are ranked and then left out of both sums (Pratt, 1959). Up to `EXACT_LIMIT` samples the test is exact, given
+    the ranks; above, it is `scipy.stats.wilcoxon`'s normal approximation, corrected for ties. If all differences are
+    zero, p is 1.
     """
     if len(differences) == 0:
         return None
@@ -62,12 +62,12 @@ def signed_rank(differences: Float[np.ndarray, "n"]) -> float | None:
 
 
 def exact_signed_rank(differences: Float[np.ndarray, "n"]) -> float:
-    """The same p from the distribution of the rank sum over all signs, ties and zeros as they are.
+    """The same p from the distribution of the rank sum over all signs, with ties and zeros as they are.
 
-    SciPy has it for samples without ties; with ties it permutes, which takes seconds.
+    SciPy has it for samples without ties; with ties it uses permutations, which take seconds.
     """
     ranks = np.round(2 * stats.rankdata(np.abs(differences))).astype(int)  # doubled: ties have half ranks
-    counts = np.ones(1)  # of the sign patterns, by the doubled sum of the positive ranks
+    counts = np.ones(1)  # sign patterns by the doubled sum of the positive ranks
     for rank in ranks[differences != 0]:
         counts = np.pad(counts, (0, rank)) + np.pad(counts, (rank, 0))
     observed = int(np.sum(ranks[differences > 0]))
@@ -76,7 +76,7 @@ def exact_signed_rank(differences: Float[np.ndarray, "n"]) -> float:
 
 
 def improvement(differences: Float[np.ndarray, "n"], level: float = 0.95) -> Estimate:
-    """The probability that the first is smaller than the second on one arena, ties counted half.
+    """The probability that the first is smaller than the second on one arena, with ties counted half.
 
     It is 1/2 + (P(smaller) - P(greater)) / 2, so the interval is Tango's for that paired difference, halved.
     """
@@ -95,15 +95,15 @@ def metric_difference(
     resamples: int = 4999,
     level: float = 0.95,
 ) -> PairedMetric:
-    """A metric where smaller is better, on the `n` arenas that both solved. `seed` seeds the bootstrap."""
-    # Sums of steps in another order differ by rounding (float32): what agrees within 0.1 mm or 0.1 ms is a tie.
+    """Compare a metric where smaller is better, on the `n` arenas that both solved. `seed` seeds the bootstrap."""
+    # Sums of steps in another order differ by rounding (float32): values within 0.1 mm or 0.1 ms are ties.
     differences = np.round(first - second, 4)
     mean, median = mean_and_median(differences, seed=seed, resamples=resamples, level=level)
     return paired_metric(differences, mean, median, level)
 
 
 def paired_metric(differences: Float[np.ndarray, "n"], mean: Estimate, median: Estimate, level: float) -> PairedMetric:
-    """All that is said of differences, whose mean and median have been estimated."""
+    """The complete comparison of differences whose mean and median have been estimated."""
     return PairedMetric(
         mean=mean,
         median=median,
@@ -125,7 +125,7 @@ def holm(p_values: Sequence[float | None]) -> list[float | None]:
 def equivalent_success(first_only: int, second_only: int, n: int, margin: float, alpha: float = 0.05) -> Estimate:
     """Two one-sided score tests (Tango, 1998) that the success rates differ by less than `margin` [fraction].
 
-    `p` is the greater of the two; the interval is the one at level 1 - 2 alpha that lies inside the margin exactly
+    `p` is the greater of the two; the interval is the one at level 1 - 2 alpha, which lies inside the margin exactly
     when p < alpha.
     """
     if n == 0:
@@ -141,7 +141,7 @@ def equivalent_success(first_only: int, second_only: int, n: int, margin: float,
 def equivalent_mean(differences: Float[np.ndarray, "n"], margin: float, alpha: float = 0.05) -> Estimate:
     """Two one-sided t tests (Schuirmann, 1987) that the mean paired difference is within +-`margin`.
 
-    Fields as in `equivalent_success`; no test on fewer than two samples or on samples that are all equal.
+    Fields as in `equivalent_success`; no test for fewer than two samples or if all samples are equal.
     """
     n = len(differences)
     if n == 0:

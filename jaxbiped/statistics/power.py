@@ -11,15 +11,15 @@ from jaxbiped.errors import InputError
 
 
 def mcnemar_power(n: int, first_only: float, second_only: float, alpha: float = 0.05) -> float:
-    """The power of McNemar's exact test on `n` arenas, summed over how many of them may be discordant.
+    """The power of McNemar's exact test on `n` arenas, summed over the possible numbers of discordant arenas.
 
     Args:
-      first_only, second_only: probabilities that only the first, only the second strategy, reaches the goal.
+      first_only, second_only: probabilities that only the first or only the second strategy reaches the goal.
     """
     discordance = first_only + second_only
     if discordance == 0:
         return 0.0
-    low, high = stats.binom.ppf([1e-12, 1 - 1e-12], n, discordance)  # counts outside cannot matter
+    low, high = stats.binom.ppf([1e-12, 1 - 1e-12], n, discordance)  # counts outside are negligible
     counts = np.arange(low, high + 1)
     # The test rejects at k or fewer of one kind: the greatest k with a one-sided tail of at most alpha / 2.
     critical = stats.binom.ppf(alpha / 2, counts, 0.5)
@@ -40,9 +40,9 @@ def connor_sample_size(first_only: float, second_only: float, power: float = 0.8
 
 
 def sample_size(first_only: float, second_only: float, power: float = 0.8, alpha: float = 0.05) -> int:
-    """Arenas for a wanted power of McNemar's exact test, from a pilot's discordant shares.
+    """Number of arenas for a given power of McNemar's exact test, from a pilot's discordant shares.
 
-    The search starts at Connor's count and goes up in steps of half a percent until the exact power is there.
+    The search starts at Connor's count and increases in steps of half a percent until the exact power is reached.
     """
     for name, value in (("first_only", first_only), ("second_only", second_only)):
         if not 0 <= value <= 1:

@@ -23,7 +23,7 @@ KEY = ("point", "arena", "strategy")
 SCHEMA = pl.Schema(
     {
         "point": pl.Int32,  # sweep point, 0 in a comparison
-        "arena": pl.Int64,  # k of fold_in(key(seed), k): what pairs the strategies
+        "arena": pl.Int64,  # k of fold_in(key(seed), k): pairs the strategies
         "family": pl.String,  # its name
         "difficulty": pl.Float32,  # 0 (easy) to 1 (hard)
         "strategy": pl.String,  # its name
@@ -35,40 +35,40 @@ SCHEMA = pl.Schema(
         "elapsed": pl.Float64,  # [s] taken, however the mission ended
         "measurements": pl.Int32,
         "decisions": pl.Int32,
-        "goal_distance": pl.Float64,  # [m] from the goal at the end
-        "pose_error": pl.Float64,  # [m] from where the robot believed to stand at the end
-        "yaw_error": pl.Float64,  # [rad] the same of its yaw, 0 to pi
+        "goal_distance": pl.Float64,  # [m] distance from the goal at the end
+        "pose_error": pl.Float64,  # [m] distance from the believed position at the end
+        "yaw_error": pl.Float64,  # [rad] the same for yaw, 0 to pi
         "reachable": pl.Boolean,  # a plan exists for this strategy with perfect knowledge (the oracle plan)
         "oracle_cost": pl.Float64,  # that plan's cost; null where there is none
         "oracle_length": pl.Float64,  # [m] that plan's length; null where there is none
-        "planning_calls": pl.Int32,  # plans that were made
-        "planning_time": pl.Float64,  # [s] that they took; null inside a compiled program, where it cannot be told
-        "plan_cost": pl.Float64,  # of the first way that was found, by Eq. 1; null where that is not known
+        "planning_calls": pl.Int32,  # number of plans made
+        "planning_time": pl.Float64,  # [s] spent on them; null inside a compiled program, where it cannot be measured
+        "plan_cost": pl.Float64,  # cost of the first path found, by Eq. 1; null if not known
     }
 )
-METRIC_NAME = r"^[a-z][a-z0-9_]{0,39}$"  # columns of metrics, which follow those of the schema: Float64, or null
-ADDED = ("planning_calls", "planning_time", "plan_cost")  # null in rows that older versions wrote
+METRIC_NAME = r"^[a-z][a-z0-9_]{0,39}$"  # columns of metrics, which follow the schema's columns: Float64, or null
+ADDED = ("planning_calls", "planning_time", "plan_cost")  # null in rows of older versions
 NULLABLE = ("distance", "time", "oracle_cost", "oracle_length", *ADDED)
 
 
 def ordered_families(names: Iterable[str]) -> tuple[str, ...]:
-    """Names of families in the order of every table and figure: those that are built in, then the others."""
+    """Names of families in the order of every table and figure: built-in ones, then the others."""
     names, usual = set(names), (*KNOWN, SCENE)
     return (*(name for name in usual if name in names), *sorted(names - set(usual)))
 
 
 def ordered(names: Iterable[str]) -> tuple[str, ...]:
-    """Names of strategies in the order of every table and figure: those that are built in, then the others."""
+    """Names of strategies in the order of every table and figure: built-in ones, then the others."""
     names = set(names)
     return (*(name for name in STRATEGIES if name in names), *sorted(names - set(STRATEGIES)))
 
 
 def validate(frame: pl.DataFrame, *, file: object = None) -> pl.DataFrame:
-    """The frame with its columns in the schema's order, then those of metrics; `InputError` about what is wrong first.
+    """The frame with its columns in the schema's order, then metrics; `InputError` about the first error.
 
-    Checked: columns and types, the named values, nulls (a number that is not valid is null, never NaN), that
-    distance and time are there exactly for those that reached, and that no row comes twice. NaN is allowed only in
-    `walked`, `elapsed`, `goal_distance` and the errors of a mission that ended as `invalid`.
+    Checked: columns and types, named values, nulls (an invalid number is null, never NaN), that distance and time are
+    present exactly for missions that reached, and that no row occurs twice. NaN is allowed only in `walked`, `elapsed`,
+    `goal_distance` and the errors of a mission that ended as `invalid`.
     """
     where = {"file": str(file)} if file is not None else {}
     frame = frame.with_columns(pl.lit(None, SCHEMA[name]).alias(name) for name in ADDED if name not in frame.columns)
@@ -100,12 +100,12 @@ def metric_columns(frame: pl.DataFrame) -> tuple[str, ...]:
 
 
 def metric_rules(names: Iterable[str]) -> dict[str, tuple[pl.Expr, str]]:
-    """As `rules`, of metrics."""
+    """As `rules`, for metrics."""
     return {name: (pl.col(name).is_not_null() & ~pl.col(name).is_finite(), "must be finite or null") for name in names}
 
 
 def rules() -> dict[str, tuple[pl.Expr, str]]:
-    """For each column: what is wrong in it, as a Boolean expression over rows, and what is allowed."""
+    """For each column: a Boolean expression over rows that finds errors, and what is allowed."""
     reached, invalid = pl.col("code") == REACHED, pl.col("code") == "invalid"
     checks = {
         "code": (~pl.col("code").is_in(CODES), f"must be one of {', '.join(CODES)}"),

@@ -1,8 +1,8 @@
-"""Watching a difference while a study runs, and stopping when its interval is tight enough, at an honest error rate.
+"""Watch a difference while a study runs, and stop when its interval is narrow enough, at a valid error rate.
 
-An interval made for a fixed number of arenas is wrong more often than it says when it is looked at again and again. A
-confidence sequence is a series of intervals that all hold at once with the stated probability, whoever looks when and
-stops why. This one is the asymptotic confidence sequence of Waudby-Smith, Arbour, Sinha, Kennedy and Ramdas,
+An interval made for a fixed number of arenas is wrong more often than stated if it is looked at repeatedly. A
+confidence sequence is a series of intervals that all hold simultaneously with the stated probability, whoever looks
+when and stops why. This one is the asymptotic confidence sequence of Waudby-Smith, Arbour, Sinha, Kennedy and Ramdas,
 "Time-uniform central limit theory and asymptotic confidence sequences" (Annals of Statistics 52, 2024), for
 the mean of independent samples.
 """
@@ -20,23 +20,23 @@ from jaxbiped.core.names import MEASURES as MEASURES
 from jaxbiped.statistics.comparison import paired
 from jaxbiped.statistics.intervals import NOTHING, Estimate
 
-FIRST_LOOK = 100  # samples: "asymptotic" means nothing before
+FIRST_LOOK = 100  # samples: with fewer, "asymptotic" means nothing
 
 
 @dataclass(frozen=True)
 class Goal:
-    """What is watched, and when it is known well enough."""
+    """The difference to watch, and when it is known well enough."""
 
     measure: str  # one of MEASURES
     first: str  # strategies; the difference is first minus second
     second: str
     width: float  # of the whole interval: [fraction], [m] or [s]
-    level: float = 0.95  # with which all intervals hold at once
+    level: float = 0.95  # probability that all intervals hold simultaneously
 
 
 @dataclass(frozen=True)
 class Watch:
-    """All that was seen so far: counts and sums, not samples."""
+    """The state so far: counts and sums, not samples."""
 
     arenas: int = 0  # with rows of both strategies
     n: int = 0  # samples: all arenas for success, those that both solved for distance and time
@@ -47,17 +47,17 @@ class Watch:
 
     @property
     def width(self) -> float | None:
-        """Of the interval; None before there is one."""
+        """Width of the interval; None before there is one."""
         return None if self.estimate.low is None else self.estimate.high - self.estimate.low
 
 
 def enough(watch: Watch, goal: Goal) -> bool:
-    """Whether the interval is as tight as was asked for."""
+    """Whether the interval is as narrow as requested."""
     return watch.width is not None and watch.width <= goal.width
 
 
 def look(watch: Watch, goal: Goal, frame: pl.DataFrame) -> Watch:
-    """The watch after one more shard's rows; shards come once each, in any order that does not depend on results."""
+    """The watch after one more shard's rows; each shard comes once, in any order that does not depend on results."""
     both, solved = paired(*(frame.filter(pl.col("strategy") == name) for name in (goal.first, goal.second)))
     watch = replace(watch, arenas=watch.arenas + len(both))
     if goal.measure == "success":
@@ -68,15 +68,15 @@ def look(watch: Watch, goal: Goal, frame: pl.DataFrame) -> Watch:
 
 
 def observe(watch: Watch, goal: Goal, samples: Float[np.ndarray, "n"]) -> Watch:
-    """The watch after more samples, and the interval of the mean then."""
+    """The watch after more samples, with the interval of the mean at that time."""
     watch = add(watch, samples)
     spread = variance(watch, goal.measure)
     if watch.n < FIRST_LOOK or spread <= 0:
         return watch
     alpha = 1 - goal.level
     if watch.intensity is None:
-        # Tightest about when the goal will be reached, as far as the first look can tell. The theorem wants it fixed
-        # beforehand; that the first samples fix it is covered by the simulation in the tests.
+        # Narrowest about when the goal will be reached, as predicted at the first look. The theorem requires it fixed
+        # beforehand; fixing it from the first samples is covered by the simulation in the tests.
         watch = replace(watch, intensity=tightest_at(arenas_for(spread, goal.width, alpha), alpha))
     half = radius(spread, watch.n, watch.intensity, alpha)
     limits = watch.mean - half, watch.mean + half
@@ -86,7 +86,7 @@ def observe(watch: Watch, goal: Goal, samples: Float[np.ndarray, "n"]) -> Watch:
 
 
 def add(watch: Watch, samples: Float[np.ndarray, "n"]) -> Watch:
-    """More samples in mean and sum of squares (Chan, Golub and LeVeque, 1983)."""
+    """Add samples to mean and sum of squares (Chan, Golub and LeVeque, 1983)."""
     if len(samples) == 0:
         return watch
     n, more = watch.n + len(samples), float(np.mean(samples))
@@ -96,8 +96,8 @@ def add(watch: Watch, samples: Float[np.ndarray, "n"]) -> Watch:
 
 
 def variance(watch: Watch, measure: str) -> float:
-    """Of one sample. Of success with half an arena added to each cell of the 2 x 2 table (Agresti and Min, 2005,
-    Statistics in Medicine 24, 729-740): else a first look at arenas that both solved would claim certainty."""
+    """Variance of one sample. For success, half an arena is added to each cell of the 2 x 2 table (Agresti and Min,
+    2005, Statistics in Medicine 24, 729-740): otherwise a first look at arenas solved by both would claim certainty."""
     if watch.n < 2:
         return 0.0
     if measure != "success":
@@ -114,9 +114,9 @@ def radius(variance: float, n: float | int, intensity: float, alpha: float) -> f
 
 
 def tightest_at(n: float | int, alpha: float) -> float:
-    """The intensity that makes `radius` least after `n` samples.
+    """The intensity that minimises `radius` after `n` samples.
 
-    With u = n rho^2 + 1 the squared radius goes with u / (u - 1) (log u - 2 log alpha), least where
+    With u = n rho^2 + 1, the squared radius is proportional to u / (u - 1) (log u - 2 log alpha), smallest where
     u - log u = 1 - 2 log alpha, that is u = -W_{-1}(-alpha^2 / e).
     """
     return (least(alpha) - 1) / n
@@ -128,7 +128,7 @@ def arenas_for(variance: float, width: float, alpha: float) -> float:
 
 
 def least(alpha: float) -> float:
-    """u of `tightest_at`: at that moment the radius is sqrt(variance u / n), where a fixed one has z^2 for u."""
+    """u of `tightest_at`: at that moment the radius is sqrt(variance u / n), where a fixed one has z^2 instead of u."""
     from scipy.special import lambertw
 
     return float(-lambertw(-(alpha**2) / e, -1).real)

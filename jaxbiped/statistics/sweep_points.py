@@ -1,4 +1,4 @@
-"""What each point of a sweep came to: success of each strategy, and paired differences on the same arenas."""
+"""The results of each point of a sweep: success of each strategy, and paired differences on the same arenas."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SweepResult:
 
     strategies: tuple[str, ...]
     points: tuple[PointResult, ...]
-    reference: int | None  # index of the point that has the config's own values, where there is one
+    reference: int | None  # index of the point with the config's own values, if there is one
     level: float
     seed: int
     resamples: int
@@ -48,7 +48,7 @@ class SweepResult:
 
 
 def asked(strategies: tuple[str, ...]) -> tuple[str, str] | None:
-    """The project's pair where both are there, else the first two; None with fewer."""
+    """The project's pair if both are present, else the first two; None with fewer."""
     if set(QUESTION) <= set(strategies):
         return QUESTION
     return strategies[:2] if len(strategies) > 1 else None
@@ -63,13 +63,13 @@ def pointwise(
     resamples: int = 999,
     level: float = 0.95,
 ) -> SweepResult:
-    """Each sweep point by itself; no correction is made for their number.
+    """Evaluate each sweep point separately, without correction for their number.
 
     Args:
       frame: rows of `schema.SCHEMA`.
-      points: as `store.read_points` gives them.
-      config: of the manifest; tells the reference.
-      seed: of the bootstraps; each has its own stream from it.
+      points: as returned by `store.read_points`.
+      config: the manifest's config, which gives the reference.
+      seed: seed of the bootstraps; each has its own stream from it.
     """
     strategies = ordered(frame["strategy"])
     pair, reference = asked(strategies), own_point(points, config)
@@ -104,7 +104,7 @@ def pointwise(
 
 
 def own_point(points: pl.DataFrame, config: Mapping[str, Any]) -> int | None:
-    """The index of the sweep point at which each field has the value that the config gives it."""
+    """The index of the sweep point at which each field has its value in the config."""
     own = {name: value_of(config, name) for name in points.columns if name != "point"}
     for row in points.iter_rows(named=True):
         if own and all(value is not None and row[name] == value for name, value in own.items()):
@@ -113,7 +113,7 @@ def own_point(points: pl.DataFrame, config: Mapping[str, Any]) -> int | None:
 
 
 def value_of(config: Mapping[str, Any], name: str) -> float | None:
-    """A dotted field of a stored config, `mission` fields without the prefix; None where it is not there."""
+    """The value of a dotted field of a stored config, `mission` fields without the prefix; None if it is missing."""
     for tree in (config.get("mission", {}), config):
         for part in name.split("."):
             tree = tree.get(part) if isinstance(tree, Mapping) else None

@@ -1,4 +1,4 @@
-"""What must be known of a pair of cameras to turn its pictures into metres: models, limits, and the file in TOML."""
+"""The calibration of a pair of cameras, for converting pictures to metres: models, limits, and the file in TOML."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from jaxbiped.errors import InputError
 from jaxbiped.sensing.config import CameraConfig
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
-Baseline = Annotated[float, Field(ge=0.001, le=2.0)]  # [m]; beyond, the file is in other units
-LEAST = 1e-9  # of what must be above 0
-DISTORTIONS = (0, 4, 5, 8, 12, 14)  # coefficients that OpenCV knows
+Baseline = Annotated[float, Field(ge=0.001, le=2.0)]  # [m]; otherwise the file is in other units
+LEAST = 1e-9  # smallest value of positive parameters
+DISTORTIONS = (0, 4, 5, 8, 12, 14)  # numbers of coefficients that OpenCV supports
 
 
 @dataclass(frozen=True)
@@ -48,29 +48,29 @@ class StereoCamera:
 
 @checked()
 def ideal(camera: CameraConfig) -> StereoCamera:
-    """The perfect camera of a camera file of the robot, as it is rendered."""
+    """The perfect camera for a camera file of the robot, as it is rendered."""
     return StereoCamera(camera.focal, camera.image.centre, camera.baseline, (camera.width, camera.height))
 
 
 class PoseConfig(Model):
-    """How the left camera is held. What is not said is found from the floor in view."""
+    """The pose of the left camera. Missing values are found from the floor in view."""
 
     pitch: float = Field(ge=-45, le=90)
-    """[deg] below the horizon."""
+    """[deg] Below the horizon."""
     roll: float = Field(0.0, ge=-180, le=180)
-    """[deg] to the right."""
+    """[deg] To the right."""
     height: float | None = Field(None, gt=0, le=100)
-    """[m] of the optical centre above the floor."""
+    """[m] Height of the optical centre above the floor."""
 
     @property
     def up(self) -> Float[np.ndarray, "3"]:
-        """The direction against gravity in the frame of the left camera (x right, y down, z ahead)."""
+        """The direction opposite to gravity in the frame of the left camera (x right, y down, z ahead)."""
         pitch, roll = math.radians(self.pitch), math.radians(self.roll)
         return np.array([-math.sin(roll) * math.cos(pitch), -math.cos(roll) * math.cos(pitch), -math.sin(pitch)])
 
 
 class RectifiedConfig(Model):
-    """A pair whose pictures are rectified: same rows, no distortion."""
+    """A pair with rectified pictures: same rows, no distortion."""
 
     width: Pixels
     """[px]"""
@@ -79,17 +79,17 @@ class RectifiedConfig(Model):
     focal: float = Field(gt=0)
     """[px]"""
     cx: float
-    """[px] column of the left principal point."""
+    """[px] Column of the left principal point."""
     cy: float
-    """[px] row of the principal point."""
+    """[px] Row of the principal point."""
     baseline: Baseline
     """[m]"""
     doffs: float = 0.0
-    """[px] column of the right principal point minus that of the left."""
+    """[px] Column of the right principal point minus that of the left."""
     num_disparities: int | None = Field(None, ge=16, le=2048, multiple_of=16)
-    """[px] search range that suits the scene."""
+    """[px] Suitable search range for the scene."""
     pose: PoseConfig | None = None
-    """How the camera is held, where that is known."""
+    """The camera's pose, if known."""
 
     @model_validator(mode="after")
     def check_whole(self) -> RectifiedConfig:
@@ -104,12 +104,12 @@ class RectifiedConfig(Model):
 
 
 class LensConfig(Model):
-    """One camera, as OpenCV calibrates it."""
+    """One camera, as calibrated by OpenCV."""
 
     focal: tuple[float, float]
-    """[px] across and down."""
+    """[px] Across and down."""
     centre: tuple[float, float]
-    """[px] principal point: column, row."""
+    """[px] Principal point: column, row."""
     distortion: tuple[float, ...] = ()
     """k1, k2, p1, p2, k3, ...: none, 4, 5, 8, 12 or 14 of them."""
 
@@ -121,12 +121,12 @@ class LensConfig(Model):
 
     @property
     def matrix(self) -> Float[np.ndarray, "3 3"]:
-        """Of the pinhole."""
+        """The pinhole matrix."""
         return np.array([[self.focal[0], 0, self.centre[0]], [0, self.focal[1], self.centre[1]], [0, 0, 1]])
 
 
 class RawConfig(Model):
-    """A pair as its cameras give it, to be rectified: p_right = rotation p_left + translation, as in OpenCV."""
+    """A pair of raw pictures, to be rectified: p_right = rotation p_left + translation, as in OpenCV."""
 
     width: Pixels
     """[px]"""
@@ -139,9 +139,9 @@ class RawConfig(Model):
     translation: tuple[float, float, float]
     """[m]; the first is below 0: the right camera is on the right."""
     num_disparities: int | None = Field(None, ge=16, le=2048, multiple_of=16)
-    """[px] search range that suits the scene."""
+    """[px] Suitable search range for the scene."""
     pose: PoseConfig | None = None
-    """How the left camera is held, where that is known."""
+    """The left camera's pose, if known."""
 
     @model_validator(mode="after")
     def check_whole(self) -> RawConfig:
@@ -162,7 +162,7 @@ class RawConfig(Model):
 
 
 def check_lens(prefix: str, focal: float, cx: float, cy: float, width: int, height: int) -> None:
-    """Raise `ValueError` unless a camera could be so."""
+    """Raise `ValueError` unless the parameters are plausible."""
     if not 0.1 * width <= focal <= 50 * width:
         raise ValueError(
             f"{prefix}focal must be in pixels, {0.1 * width:g} to {50 * width:g} for a width of {width}, got {focal:g}"

@@ -20,7 +20,7 @@ from jaxbiped.stereo.ros_camera import is_ros, read_ros
 
 OPENCV = (".yaml", ".yml", ".xml")
 SUFFIXES = (".toml", *OPENCV, ".txt")
-# What OpenCV's samples, and programs made after them, call the same things.
+# Names of the same values in OpenCV's samples, and in programs derived from them.
 NAMES = {
     "left": ("M1", "K1", "cameraMatrix1", "camera_matrix_left", "left_camera_matrix", "K_left"),
     "left_distortion": ("D1", "distCoeffs1", "dist_coeffs_left", "left_distortion", "D_left"),
@@ -31,7 +31,7 @@ NAMES = {
 }
 SIZES = ("size", "imageSize", "image_size"), ("width", "image_width"), ("height", "image_height")
 UNREAD = re.compile("dist|^(kc|kd|d)_?([012lr]|left|right)$", re.IGNORECASE)  # keys that look like distortion
-LONGEST = 10_000  # of a list that is looked at
+LONGEST = 10_000  # longest list that is read
 SIDES = ("width", "height")
 
 
@@ -41,10 +41,10 @@ def load_rig(path: str | Path, shape: tuple[int, int]) -> Rig:
     Args:
       path: .toml (`RectifiedConfig`, `RawConfig`, or the robot's own `CameraConfig`), .yaml, .yml or .xml of OpenCV's
         FileStorage, .yaml or .yml of ROS (one camera's, beside the other's), or a Middlebury calib.txt.
-      shape: [px] width and height of the pictures, where the file does not say.
+      shape: [px] width and height of the pictures, for files without a size.
 
     Raises:
-      InputError: no such file, another suffix, keys that are missing or unknown, values that no camera has.
+      InputError: no such file, an unknown suffix, keys that are missing or unknown, implausible values.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -62,7 +62,7 @@ def load_rig(path: str | Path, shape: tuple[int, int]) -> Rig:
 
 
 def rig_of(data: dict, path: Path) -> Rig:
-    """The rig of what a file holds; raise `InputError` that names it."""
+    """The rig in a file's data; raise `InputError` that names the file."""
     try:
         return make_rig(parse(RawConfig if "left" in data else RectifiedConfig, data, file=path))
     except InputError as error:
@@ -72,7 +72,7 @@ def rig_of(data: dict, path: Path) -> Rig:
 
 
 def read_toml(path: Path) -> Rig:
-    """Our own files, told apart by their keys."""
+    """Read our own files, distinguished by their keys."""
     data = load_toml(path)
     if "field_of_view" in data or not {"focal", "left", "right", "cx"} & set(data):
         robot = parse(CameraConfig, data, file=path)
@@ -93,7 +93,7 @@ def read_opencv(path: Path, shape: tuple[int, int]) -> dict:
     except (cv2.error, SystemError):
         fields = None
     if not isinstance(fields, dict):
-        raise InputError("is no OpenCV calibration, or is damaged", file=path)
+        raise InputError("is not an OpenCV calibration, or is damaged", file=path)
     check_lens_model(fields, path)
     found = {key: next((fields[name] for name in names if name in fields), None) for key, names in NAMES.items()}
     for key, value in found.items():
@@ -132,7 +132,7 @@ def read_opencv(path: Path, shape: tuple[int, int]) -> dict:
 
 
 def plain(node: cv2.FileNode) -> Any:
-    """A node of a FileStorage as Python's own and NumPy's: mappings, lists, numbers, texts, matrices (float64)."""
+    """A node of a FileStorage as Python and NumPy values: mappings, lists, numbers, texts, matrices (float64)."""
     if node.isMap():
         try:
             matrix = node.mat()
@@ -149,7 +149,7 @@ def plain(node: cv2.FileNode) -> Any:
 
 
 def opencv_size(fields: dict[str, Any], shape: tuple[int, int], path: Path) -> tuple[int, int]:
-    """Width and height as the file says, else those of the pictures."""
+    """Width and height from the file, else those of the pictures."""
     pair, *sides = ([fields[name] for name in names if name in fields] for names in SIZES)
     for values in pair:
         if isinstance(values, list | np.ndarray) and np.size(values) == 2:
@@ -185,7 +185,7 @@ def read_middlebury(path: Path, shape: tuple[int, int]) -> dict:
 
 
 def one_number(fields: dict[str, str], name: str, path: Path, default: float | int | None = None) -> float | int | None:
-    """The number of a field, or what it is by default."""
+    """The number in a field, or its default."""
     if name not in fields:
         return default
     numbers = number_list(fields[name], path, name)
@@ -195,7 +195,7 @@ def one_number(fields: dict[str, str], name: str, path: Path, default: float | i
 
 
 def number_list(text: str, path: Path, name: str) -> list[float]:
-    """The finite numbers of a field, between which stand spaces, brackets, commas and semicolons."""
+    """The finite numbers of a field, separated by spaces, brackets, commas and semicolons."""
     try:
         numbers = [float(word) for word in re.split(r"[\s;,\[\]]+", text) if word]
     except ValueError:

@@ -1,4 +1,4 @@
-"""What may be chosen of the matcher."""
+"""The options of the matcher."""
 
 from __future__ import annotations
 
@@ -10,41 +10,41 @@ from jaxbiped.config import Model
 
 
 class MatchParams(Model):
-    """Numbers of the matcher, with the values found necessary on rendered and on real pairs.
+    """Parameters of the matcher, with values that proved necessary on rendered and on real pairs.
 
-    Small blocks and low prices follow what is seen at a slant. With prices four times as high mode `5way`, OpenCV's own
-    default, which has no path from below, is off by 0.1 px on a floor that recedes.
+    Small blocks and low penalties follow slanted surfaces. With penalties four times as high, mode `5way`, OpenCV's own
+    default, which has no path from below, has an error of 0.1 px on a receding floor.
     """
 
     num_disparities: int = Field(160, ge=16, le=2048, multiple_of=16)
-    """[px] search range; sets the nearest distance that can be measured."""
+    """[px] Search range; sets the nearest distance that can be measured."""
     min_disparity: int = Field(0, ge=-1024, le=1024)
-    """[px] least disparity; below 0 for cameras that squint (`doffs`)."""
+    """[px] Smallest disparity; below 0 for cameras that squint (`doffs`)."""
     block_size: int = Field(3, ge=1, le=11)
-    """[px] side of a block; odd."""
+    """[px] Side of a block; odd."""
     p1: int = Field(30, ge=0, le=8191)
-    """Price of a change of disparity by 1 px to the next pixel."""
+    """Penalty on a change of disparity by 1 px to the next pixel."""
     p2: int = Field(250, ge=1, le=8192)
-    """Price of a greater change; above p1. (OpenCV sums prices in 16 bits.)"""
+    """Penalty on a greater change; above p1. (OpenCV sums penalties in 16 bits.)"""
     pre_filter_cap: int = Field(63, ge=1, le=63)
-    """Gradients beyond this are cut."""
+    """Gradients beyond this are clipped."""
     uniqueness: int = Field(5, ge=0, le=99)
-    """[%] by which the best match must beat the next."""
+    """[%] Margin by which the best match must beat the next."""
     speckle_size: int = Field(200, ge=0, le=2**30)
-    """[px] patches of no more pixels are dropped; 0 for none."""
+    """[px] Patches with no more pixels than this are dropped; 0 for none."""
     speckle_range: int = Field(2, ge=1, le=2048)
-    """[px] by which disparity may change within a patch."""
+    """[px] Largest change of disparity within a patch."""
     left_right: int = Field(1, ge=-1, le=2048)
-    """[px] by which left and right disparities may differ; -1 for no check."""
+    """[px] Largest difference of left and right disparities; -1 for no check."""
     agreement: float = Field(0.35, ge=-1, lt=1)
-    """Least correlation of the two images' gradients about a matched pixel; -1 for no check. What both images share is
-    texture; what is plain shows each camera's own noise, which a matcher matches as well, and wrongly."""
+    """Smallest correlation of the two images' gradients around a matched pixel; -1 for no check. Both images share
+    texture; plain surfaces show each camera's own noise, which a matcher matches as well, and wrongly."""
     agreement_window: int = Field(15, ge=3, le=101)
-    """[px] side of the window of that correlation; odd."""
+    """[px] Side of the window of that correlation; odd."""
     mode: Literal["3way", "hh", "5way"] = "3way"
-    """Paths that are searched: 3 (fast), all 8 (3 times the time), or 5."""
+    """Search paths: 3 (fast), all 8 (3 times the time), or 5."""
     slanted: bool = True
-    """Search once more for what one image shows much wider than the other, which takes as long again."""
+    """Search again for surfaces that one image shows much wider than the other, which takes as long again."""
 
     @model_validator(mode="after")
     def check_whole(self) -> MatchParams:

@@ -1,7 +1,7 @@
-"""The noise model of the ray-cast sensor, fitted to a matcher that is watched at work on rendered pairs.
+"""The noise model of the ray-cast sensor, fitted to a matcher on rendered pairs.
 
-What the renderer knows of each pixel's depth tells what the matcher should have found. Surfaces are told apart as the
-noise model does (`sensing.noise`): by differences of disparity over as many pixels as lie between two rays.
+The renderer knows each pixel's depth, hence the disparity that the matcher should have found. Surfaces are classified
+as in the noise model (`sensing.noise`): by differences of disparity over as many pixels as lie between two rays.
 """
 
 from __future__ import annotations
@@ -18,38 +18,38 @@ from jaxbiped.sensing.config import NoiseConfig
 from jaxbiped.sensing.noise import LEAST_WIDTH
 from jaxbiped.stereo.measure import StereoSensor
 
-LAG = 8  # [px] over which slopes and edges are told: from a ray to the next
-THIN = 3  # every so many pixels across and down are kept
+LAG = 8  # [px] over which slopes and edges are measured: from one ray to the next
+THIN = 3  # one in so many pixels across and down is kept
 CORE = 1.0  # [px] beyond which a disparity is wrong, not noisy
-SAME_DEPTH = 0.01  # relative: what both cameras see in one place is the same surface
-KEPT, OVER = np.arange(0.1, 1.55, 0.05), np.arange(0.05, 2.05, 0.05)  # stretches looked at: from, and how much more
-SHARES = np.arange(0.7, 0.99, 0.02)  # that may be lost of what is stretched most
-BIN, STRETCHED = 0.02, 4.0  # of a histogram of stretches, and its end
-OFF = 100.0  # [px/px] slope from which on nothing is lost that stretch does not lose
-FLAT = 0.02  # [px/px] slope of what faces the camera
-RIM, CREASE = 14, 0.02  # [px] that a rim's own texture reaches; second difference of disparity at one
-FEWEST = 200  # pixels of a kind that tell something of it
+SAME_DEPTH = 0.01  # relative: points that both cameras see within this belong to the same surface
+KEPT, OVER = np.arange(0.1, 1.55, 0.05), np.arange(0.05, 2.05, 0.05)  # stretches tried: start, and extent
+SHARES = np.arange(0.7, 0.99, 0.02)  # share of the most stretched surfaces that may be lost
+BIN, STRETCHED = 0.02, 4.0  # bin width of a histogram of stretches, and its end
+OFF = 100.0  # [px/px] slope above which only stretch causes losses
+FLAT = 0.02  # [px/px] slope of surfaces that face the camera
+RIM, CREASE = 14, 0.02  # [px] reach of a rim's own texture; second difference of disparity at a rim
+FEWEST = 200  # fewest pixels of a kind for an estimate
 
 
 @dataclass(frozen=True)
 class Watched:
-    """Pixels of one or of many views, and what the matcher made of them."""
+    """Pixels of one or of many views, and the matcher's result for them."""
 
     true: Float32[np.ndarray, "N"]  # [px] disparity; 0 where there is nothing to see
     found: Float32[np.ndarray, "N"]  # [px]; 0 where not measured
     slope: Float32[np.ndarray, "N"]  # [px/px] across the image
     stretch: Float32[np.ndarray, "N"]  # share by which one image shows the surface wider than the other
     bend: Float32[np.ndarray, "N"]  # [px] second difference
-    beyond: Float32[np.ndarray, "N"]  # [px] from here to the other side of an edge
-    common: Bool[np.ndarray, "N"]  # both cameras see it
-    near: Bool[np.ndarray, "N"]  # nearer than the search range
-    inner: Bool[np.ndarray, "N"]  # of one face, and far from its rims
-    error_right: Float32[np.ndarray, "N"]  # [px] error of the pixel `LAG` to the right; NaN where it is not noise
+    beyond: Float32[np.ndarray, "N"]  # [px] difference to the other side of an edge
+    common: Bool[np.ndarray, "N"]  # whether both cameras see it
+    near: Bool[np.ndarray, "N"]  # whether it is nearer than the search range
+    inner: Bool[np.ndarray, "N"]  # whether it is on one face, and far from its rims
+    error_right: Float32[np.ndarray, "N"]  # [px] error of the pixel `LAG` to the right; NaN if it is not noise
     error_down: Float32[np.ndarray, "N"]  # [px]
 
 
 def watch(sensor: StereoSensor, origin: Float[np.ndarray, "3"], basis: Float[np.ndarray, "3 3"], seed: int) -> Watched:
-    """The matcher at work on the arena that the sensor shows, from one place."""
+    """Run the matcher on the arena that the sensor shows, from one place."""
     camera = sensor.camera
     pair = sensor.renderer.pair(origin, basis, camera.image_noise, seed, depth=True)
     found = sensor.match(pair).value
@@ -63,7 +63,7 @@ def watch(sensor: StereoSensor, origin: Float[np.ndarray, "3"], basis: Float[np.
 def seen_by_both(
     true: Float32[np.ndarray, "H W"], depth: Float32[np.ndarray, "H W"], right: Float32[np.ndarray, "H W"]
 ) -> Bool[np.ndarray, "H W"]:
-    """Pixels of the left image whose surface the right one shows, by the depth images of both."""
+    """Pixels of the left image whose surface is visible in the right one, from the depth images of both."""
     width = true.shape[1]
     column = np.arange(width) - true
     at = np.clip(np.round(column).astype(int), 0, width - 1)
@@ -75,7 +75,7 @@ def seen_by_both(
 def thinned(
     true: Float32[np.ndarray, "H W"], found: Float32[np.ndarray, "H W"], common: Bool[np.ndarray, "H W"], most: float
 ) -> Watched:
-    """Some of the pixels, with what surrounds them."""
+    """A subset of the pixels, with their surroundings."""
     n = LAG
     d = true[n:-n, n:-n]
     to_left, to_right = true[n:-n, : -2 * n] - d, true[n:-n, 2 * n :] - d
@@ -102,7 +102,7 @@ def thinned(
 
 
 def far_from_rims(true: Float32[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
-    """Pixels that are at least `RIM` away from where disparity bends, and from what is nothing."""
+    """Pixels that are at least `RIM` away from bends of disparity, and from empty space."""
     bent = true <= 0
     bent[:, 1:-1] |= np.abs(true[:, 2:] + true[:, :-2] - 2 * true[:, 1:-1]) > CREASE
     bent[1:-1] |= np.abs(true[2:] + true[:-2] - 2 * true[1:-1]) > CREASE
@@ -123,15 +123,15 @@ def together(watched: Sequence[Watched]) -> Watched:
 class Quality:
     """How well a matcher measures textured surfaces that both cameras see."""
 
-    bias: float  # [px] mean error of what is within `CORE`
+    bias: float  # [px] mean error of disparities within `CORE`
     sd: float  # [px]
-    measured: float  # share of what both cameras see, nearer than the search range left out
-    wrong: float  # share of what is measured there that is off by more than `CORE`
-    phantoms: float  # share of what only the left camera sees that comes out as something, off by more than `CORE`
+    measured: float  # share of what both cameras see, except nearer than the search range
+    wrong: float  # share of those with an error above `CORE`
+    phantoms: float  # share of what only the left camera sees that is matched, with an error above `CORE`
 
 
 def quality(w: Watched) -> Quality:
-    """Of all pixels."""
+    """The quality over all pixels."""
     visible = w.common & ~w.near
     measured = visible & (w.found > 0)
     error = (w.found - w.true)[measured]
@@ -150,16 +150,16 @@ def quality(w: Watched) -> Quality:
 def share(
     part: Bool[np.ndarray, "N"], whole: Bool[np.ndarray, "N"], least: int = FEWEST, otherwise: float = 0.0
 ) -> float:
-    """Of a mask, within another; `otherwise` where that has too few pixels."""
+    """The share of a mask within another; `otherwise` if that has too few pixels."""
     count = int(whole.sum())
     return float((part & whole).sum() / count) if count >= least else otherwise
 
 
 def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
-    """The noise that makes the ray-cast sensor measure as the matcher did; `base` has what no picture tells.
+    """The noise with which the ray-cast sensor measures like the matcher; `base` has what pictures cannot tell.
 
-    From `base` come the quantum, the threshold of edges, the attitude's error, the range, and the least contrast. What
-    is lost by its slope is told by stretch alone: a slope down the image loses nothing.
+    `base` provides the quantum, the threshold of edges, the attitude error, the range, and the lowest contrast. Losses
+    by slope are modelled by stretch alone: a slope down the image causes no losses.
     """
     visible, measured = w.common & ~w.near, w.found > 0
     edge = w.bend > base.edge_jump
@@ -189,7 +189,7 @@ def fit_noise(w: Watched, base: NoiseConfig) -> NoiseConfig:
 
 
 def losses(stretch: Float[np.ndarray, "N"], lost: Bool[np.ndarray, "N"]) -> dict[str, float]:
-    """Between which stretches surfaces come to be lost, and how much of them at most: the likeliest; {} if none tells.
+    """Maximum-likelihood range of stretches over which surfaces get lost, and the largest share; {} if undetermined.
 
     The model has a constant share that is lost, and another that grows in proportion between two stretches.
     """
@@ -211,7 +211,7 @@ def losses(stretch: Float[np.ndarray, "N"], lost: Bool[np.ndarray, "N"]) -> dict
 
 
 def spread(error: Float[np.ndarray, "N"], across: Float[np.ndarray, "N"]) -> tuple[float, float]:
-    """Standard deviation [px] on a surface without slope, and how it grows: sd (1 + gain slope)."""
+    """Standard deviation [px] on a surface without slope, and its growth: sd (1 + gain slope)."""
     flat = across < FLAT
     sd = float(np.std(error[flat])) if flat.sum() >= FEWEST else float(np.std(error))
     edges = np.quantile(across[~flat], np.linspace(0, 1, 9)) if (~flat).sum() >= 8 * FEWEST else []
@@ -227,7 +227,7 @@ def spread(error: Float[np.ndarray, "N"], across: Float[np.ndarray, "N"]) -> tup
 
 
 def correlation(w: Watched, noisy: Bool[np.ndarray, "N"], error: Float[np.ndarray, "N"]) -> float:
-    """Of the errors of pixels `LAG` apart, across and down."""
+    """Correlation of the errors of pixels `LAG` apart, across and down."""
     found = []
     for other in (w.error_right, w.error_down):
         both = noisy & np.isfinite(other)

@@ -1,4 +1,4 @@
-"""Pictures from files: any depth of grey or colour, turned upright as their EXIF tags say, as 8 bits."""
+"""Pictures from files: any depth of grey or colour, rotated according to their EXIF tags, as 8 bits."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ DEEP = ("I;16", "I;16B", "I;16L", "I;16N", "I", "F")  # modes of more than 8 bit
 def load_pair(left: str | Path, right: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """The two pictures of a pair, UInt8 [H, W] or [H, W, 3].
 
-    Pictures of more than 8 bits are scaled by one factor for both, so that the brightest 0.1 % of their pixels are
-    white: a matcher compares them.
+    Pictures of more than 8 bits are scaled by a common factor, so that the brightest 0.1 % of their pixels are white: a
+    matcher compares them.
 
     Raises:
-      InputError: no such file, no picture, a damaged one, one of over 64 million pixels, or without two grey levels;
+      InputError: no such file, not a picture, a damaged one, one of over 64 million pixels, or without two grey levels;
         pictures of different size.
     """
     pair = [read(path, field) for path, field in ((left, "left"), (right, "right"))]
@@ -53,7 +53,7 @@ def load_pair(left: str | Path, right: str | Path) -> tuple[np.ndarray, np.ndarr
 
 
 def read(path: str | Path, field: str) -> np.ndarray:
-    """One picture, upright: 8 bits grey or RGB, or float32 grey or RGB of more bits; alpha is left out."""
+    """One picture, upright: 8 bits grey or RGB, or float32 grey or RGB for more bits; alpha is dropped."""
     try:
         data = Path(path).read_bytes()
     except FileNotFoundError:
@@ -68,14 +68,14 @@ def read(path: str | Path, field: str) -> np.ndarray:
     except UnsupportedError as error:
         raise InputError(f"is a kind of picture that is not supported: {error}", file=path, field=field) from None
     except UnidentifiedImageError:
-        message = "is no picture, or is damaged, or of a kind that is not supported"
+        message = "is not a picture, or is damaged, or of a kind that is not supported"
         raise InputError(message, file=path, field=field) from None
-    except Exception:  # Pillow raises whatever a damaged picture makes it trip over
-        raise InputError("is no picture, or is damaged", file=path, field=field) from None
+    except Exception:  # Pillow raises errors of many types for damaged pictures
+        raise InputError("is not a picture, or is damaged", file=path, field=field) from None
 
 
 def read_tiff(data: bytes, path: str | Path, field: str) -> Float32[np.ndarray, "H W *C"] | None:
-    """A TIFF picture of more than 8 bits; None where it has fewer, or where Pillow alone can read it."""
+    """A TIFF picture of more than 8 bits; None if it has fewer, or if only Pillow can read it."""
     tags = tiff_tags(data)
     check_size(tags.get(WIDTH, 0), tags.get(HEIGHT, 0), path, field)
     samples = deep_samples(data) if sample_bits(data) > 8 else None
@@ -83,7 +83,7 @@ def read_tiff(data: bytes, path: str | Path, field: str) -> Float32[np.ndarray, 
 
 
 def read_any(data: bytes, path: str | Path, field: str) -> np.ndarray:
-    """Any picture that Pillow knows."""
+    """Any picture that Pillow can read."""
     with no_chatter(), Image.open(io.BytesIO(data)) as picture:
         check_size(*picture.size, path, field)
         picture.load()
@@ -96,22 +96,22 @@ def read_any(data: bytes, path: str | Path, field: str) -> np.ndarray:
             if samples is not None and samples.dtype != np.uint8:
                 return as_light(samples)
             if deep:
-                raise UnsupportedError(f"{picture.mode} of {sample_bits(data)} bits a sample")
+                raise UnsupportedError(f"{picture.mode} of {sample_bits(data)} bits per sample")
         return np.asarray(picture.convert("L" if picture.mode in ("L", "LA", "La", "1") else "RGB"))
 
 
 def as_light(samples: np.ndarray) -> Float32[np.ndarray, "H W *C"]:
-    """What was measured, 0 or more; what is not finite is 0."""
+    """Samples clipped to 0 or more; values that are not finite become 0."""
     return np.maximum(np.nan_to_num(samples.astype(np.float32), posinf=0, neginf=0), 0)
 
 
 def check_size(width: int, height: int, path: str | Path, field: str) -> None:
-    """Raise `InputError` about a picture that is too large, before it is unpacked."""
+    """Raise `InputError` about a picture that is too large, before it is decoded."""
     if width * height > MOST_PIXELS:
         message = f"must have at most {MOST_PIXELS:,} pixels"
         raise InputError(message, file=path, field=field, value=f"{width} x {height}")
 
 
 def as_rgb(image: UInt8[np.ndarray, "H W *C"]) -> UInt8[np.ndarray, "N 3"]:
-    """Colours of all pixels, row after row."""
+    """Colours of all pixels, row by row."""
     return np.repeat(image.reshape(-1, 1), 3, axis=1) if image.ndim == 2 else image.reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""The landmark model of the ray-cast sensor, fitted to landmarks that were really found in rendered pairs."""
+"""The landmark model of the ray-cast sensor, fitted to landmarks that were found in rendered pairs."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from jaxtyping import Bool, Float
 from jaxbiped.arenas.arena import CIRCLE, SQUARE
 from jaxbiped.sensing.config import LandmarkConfig
 
-LEAST_SD, LEAST_PER_METRE = 0.0003, 0.0001  # [m], [m/m] that no model goes below: a print is not better than that
-BINS = 6  # of range, in each of which errors are summed up
-FEWEST = 12  # landmarks that tell something of a limit, or of an error
+LEAST_SD, LEAST_PER_METRE = 0.0003, 0.0001  # [m], [m/m] lower bounds of the model: a print is no better than that
+BINS = 6  # range bins in which errors are averaged
+FEWEST = 12  # fewest landmarks for a limit or an error
 
 
 @dataclass(frozen=True)
 class Sight:
-    """One landmark that lay in view of both cameras."""
+    """One landmark that was in view of both cameras."""
 
     kind: int
     distance: float  # [m] from the robot's axis
-    error: tuple[float, float] | None  # [m] of forward and left; None where it was not found
+    error: tuple[float, float] | None  # [m] of forward and left; None if it was not found
 
 
 def fit_landmarks(sights: Sequence[Sight], base: LandmarkConfig) -> LandmarkConfig:
-    """How errors grow with range, and from where to where landmarks are found; `base` where too few tell.
+    """How errors grow with range, and the ranges in which landmarks are found; `base` if there are too few.
 
     The standard deviation is the straight line through those of `BINS` bins of equal numbers; the limits are those that
-    are right about the most landmarks.
+    are correct for the most landmarks.
     """
     found = [sight for sight in sights if sight.error is not None]
     values = {}
@@ -52,7 +52,7 @@ def fit_landmarks(sights: Sequence[Sight], base: LandmarkConfig) -> LandmarkConf
 
 
 def growth(distance: Float[np.ndarray, "n"], error: Float[np.ndarray, "n"]) -> dict[str, float]:
-    """Standard deviation at range 0, and a metre's growth of it."""
+    """Standard deviation at range 0, and its growth per metre."""
     order = np.array_split(np.argsort(distance), BINS)
     x = np.array([distance[part].mean() for part in order])
     y = np.array([np.sqrt(np.mean(error[part] ** 2)) for part in order])
@@ -63,7 +63,7 @@ def growth(distance: Float[np.ndarray, "n"], error: Float[np.ndarray, "n"]) -> d
 
 
 def limits(distance: Float[np.ndarray, "n"], seen: Bool[np.ndarray, "n"]) -> tuple[float, float]:
-    """Least and greatest range [m] such that most landmarks between them are found, and most others are not."""
+    """Smallest and greatest range [m] such that most landmarks between them are found, and most others are not."""
     order = np.argsort(distance)
     distance, gain = distance[order], np.where(seen[order], 1, -1)
     score = np.concatenate([[0], np.cumsum(gain)])  # of the first n

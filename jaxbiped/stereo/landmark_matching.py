@@ -1,4 +1,4 @@
-"""Which landmark is which: what was found in the pictures, against what is known to lie where (paper, 2)."""
+"""Landmark identification: matching found shapes to landmarks at known positions (paper, 2)."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from jaxbiped.sensing.view import Sightings
 from jaxbiped.stereo.calibration import StereoCamera
 from jaxbiped.stereo.landmarks import Blob, Mark, level_rays
 
-GATE, GATE_PER_METRE = 0.10, 0.10  # [m] from where a landmark is expected: of the place, and by the heading
-BORDER = 0.03  # [m] around a known landmark in which its colour is its own
+GATE, GATE_PER_METRE = 0.10, 0.10  # [m] from the expected position: constant, and per metre due to the heading
+BORDER = 0.03  # [m] around a known landmark within which its colour is attributed to it
 
 
 def recognise(marks: Sequence[Mark], landmarks: Landmarks, believed: Pose, spread: LandmarkNoise) -> Sightings:
-    """Each mark as the landmark of its kind that is expected nearest to it; all on the host, without a batch axis.
+    """Assign each mark to the nearest expected landmark of its kind; all on the host, without a batch axis.
 
-    Marks that are near no landmark, or near two, and landmarks that two marks are near to, are refused.
+    Marks that are near no landmark, or near two, and landmarks that are near two marks, are rejected.
 
     Args:
-      believed: where the robot believes to stand.
-      spread: the least standard deviation of what is seen.
+      believed: the believed pose.
+      spread: the smallest standard deviation of sightings.
     """
     slots = np.shape(landmarks.x)
     x, y, sd = (np.zeros(slots, np.float32) for _ in range(3))
@@ -48,7 +48,7 @@ def recognise(marks: Sequence[Mark], landmarks: Landmarks, believed: Pose, sprea
 
 
 def in_robot(pose: Pose, landmarks: Landmarks) -> tuple[Float[np.ndarray, "L"], Float[np.ndarray, "L"]]:
-    """Landmarks (forward, left) [m] of a robot."""
+    """Positions (forward, left) [m] of landmarks relative to a robot."""
     cos, sin = np.cos(pose.yaw), np.sin(pose.yaw)
     dx, dy = landmarks.x - pose.x, landmarks.y - pose.y
     return cos * dx + sin * dy, cos * dy - sin * dx
@@ -62,13 +62,13 @@ def floor_disparity(
     at: Mount,
     below: float,
 ) -> Float32[np.ndarray, "H W"]:
-    """Disparity [px] of the floor, where the left image shows a known landmark lie on it; 0 elsewhere.
+    """Disparity [px] of the floor, where the left image shows a known landmark on it; 0 elsewhere.
 
-    Landmarks are plain: a matcher sees holes in the floor where there are none. A pixel is one of a landmark when it
-    has its colour, and the floor there is, as the robot believes to stand, within `BORDER` of it.
+    Landmarks are plain: a matcher would see holes in the floor. A pixel belongs to a landmark if it has its colour, and
+    the floor there is within `BORDER` of it according to the believed pose.
 
     Args:
-      below: [m] of the floor below the camera.
+      below: [m] depth of the floor below the camera.
     """
     width, height = camera.size
     disparity = np.zeros((height, width), np.float32)

@@ -1,10 +1,10 @@
 """Landmarks in a pair of pictures: red discs and blue squares on the floor, found and measured to a millimetre.
 
-All is done on the floor. A pixel's ray meets a level plane that lies D below the camera at D times a direction that
-depends on the pixel alone, so that a contour on the floor is linear in D. Of both contours of a shape, left and right,
-the middle and D are fitted together: its known size and the distance of the two cameras both bear on it, and centres of
-ellipses, which perspective moves by millimetres, are not needed. As a robot tilts about its feet, the middle is right
-whatever its attitude, to second order. (Paper, 2.1 and 3.1, which name the shapes, not how they are measured.)
+All is computed on the floor. A pixel's ray meets a level plane at depth D below the camera at D times a direction that
+depends on the pixel alone, so that a contour on the floor is linear in D. Middle and D are fitted jointly to the left
+and right contours of a shape: its known size and the distance of the two cameras both determine them, and centres of
+ellipses, which perspective moves by millimetres, are not needed. As a robot tilts about its feet, the middle is correct
+for any attitude, to second order. (Paper, 2.1 and 3.1, which name the shapes, not how they are measured.)
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from jaxbiped.arenas.arena import CIRCLE, DISC_RADIUS, SQUARE, SQUARE_SIDE
 from jaxbiped.sensing.camera import Mount
 from jaxbiped.stereo.calibration import StereoCamera
 
-CHANNELS = {CIRCLE: (0, 1, 2), SQUARE: (2, 0, 1)}  # of RGB: the colour of a kind, and the two that it lacks
+CHANNELS = {CIRCLE: (0, 1, 2), SQUARE: (2, 0, 1)}  # RGB channels: the colour of a kind, and the two others
 VIVID = 60  # grey levels by which its colour exceeds the others
-LEAST_PIXELS = 24  # of a shape
-PROFILE = np.arange(-2.5, 2.51, 0.25)  # [px] across a contour, inwards to outwards, where its edge is looked for
-HEIGHT_SD, TILT_SD = 0.015, 0.01  # [m, rad] of the floor below the camera, and of how the robot holds itself
-CORNER = 0.7  # share of half a side, from the middle, in which points tell of that side
-ROUNDS, NUDGE, CONVERGED = 8, 1e-5, 1e-5  # of Gauss and Newton; steps [m, rad]
-BLUR = 0.12  # [px] standard deviation of a contour's point
+LEAST_PIXELS = 24  # fewest pixels of a shape
+PROFILE = np.arange(-2.5, 2.51, 0.25)  # [px] across a contour, inwards to outwards, along which its edge is searched
+HEIGHT_SD, TILT_SD = 0.015, 0.01  # [m, rad] of the floor's depth below the camera, and of the robot's attitude
+CORNER = 0.7  # share of half a side, from the middle, in which points are used for that side
+ROUNDS, NUDGE, CONVERGED = 8, 1e-5, 1e-5  # Gauss-Newton rounds; steps [m, rad]
+BLUR = 0.12  # [px] standard deviation of a contour point
 WORST_MEAN, WORST = 0.35, 1.6  # [px] root mean square, and greatest distance, of a whole shape's contour from its fit
-WORST_SD = 0.004  # [m] of a middle
-FEWEST = 10  # points of a contour, in each image
-SAME_ROW = 2.5  # [px] between the middles of a shape in both images
-FURTHEST_MATCH = 0.3  # share by which a disparity may differ from that of the floor
+WORST_SD = 0.004  # [m] largest standard deviation of a middle
+FEWEST = 10  # fewest points of a contour, in each image
+SAME_ROW = 2.5  # [px] largest row difference of a shape's middles in both images
+FURTHEST_MATCH = 0.3  # largest relative deviation of a disparity from that of the floor
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Mark:
     x: float  # [m] forward
     y: float  # [m] left
     yaw: float  # [rad] of a square, modulo 90 degrees, in [-pi/4, pi/4); 0 of a disc
-    cov: Float64[np.ndarray, "2 2"]  # [m^2] of x and y, by the contour's own noise
-    below: float  # [m] of the floor below the camera
+    cov: Float64[np.ndarray, "2 2"]  # [m^2] of x and y, from the contour's own noise
+    below: float  # [m] depth of the floor below the camera
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Blob:
     mask: Bool[np.ndarray, "h w"]
     corner: tuple[int, int]  # [px] (u, v) of the mask's first pixel
     middle: Float64[np.ndarray, "2"]  # [px] (u, v)
-    whole: bool  # does not touch the image's border
+    whole: bool  # whether it does not touch the image's border
     contour: Float64[np.ndarray, "N 2"]  # [px] of its edge
     normal: Float64[np.ndarray, "N 2"]  # outwards
 
@@ -65,17 +65,17 @@ def find(
     at: Mount,
     floor: float,
 ) -> tuple[tuple[Mark, ...], tuple[tuple[int, Blob], ...]]:
-    """Landmarks of a pair.
+    """Find the landmarks of a pair.
 
-    A shape counts where it is whole in both images and its contours fit: what is half hidden, of another size or
-    another shape, or not on the floor, does not.
+    A shape counts if it is completely visible in both images and its contours fit: shapes that are half hidden, of
+    another size or form, or not on the floor, do not.
 
     Args:
-      at: where the camera is believed to sit on the robot.
-      floor: [m] height of the floor over the robot's supporting surface; negative when it stands on a bump.
+      at: believed pose of the camera on the robot.
+      floor: [m] height of the floor over the robot's supporting surface; negative if it stands on a bump.
 
     Returns:
-      What was measured; and all patches of the landmarks' colours in the left image, with their kinds.
+      The measured landmarks; and all patches of the landmarks' colours in the left image, with their kinds.
     """
     below = float(at.height) - floor
     marks, patches = [], []
@@ -92,7 +92,7 @@ def find(
 
 
 def vividness(image: UInt8[np.ndarray, "H W 3"], kind: int) -> UInt8[np.ndarray, "H W"]:
-    """How much more of a kind's colour than of the two others there is in each pixel; 0 where there is less."""
+    """By how much a kind's colour exceeds the two others in each pixel; 0 where it does not."""
     own, other, third = (np.ascontiguousarray(image[..., k]) for k in CHANNELS[kind])
     return cv2.subtract(own, cv2.max(other, third))
 
@@ -117,7 +117,7 @@ def blobs(image: UInt8[np.ndarray, "H W 3"], kind: int) -> list[Blob]:
 def contour(
     vivid: UInt8[np.ndarray, "H W"], mask: Bool[np.ndarray, "h w"], corner: tuple[int, int]
 ) -> tuple[Float64[np.ndarray, "N 2"], Float64[np.ndarray, "N 2"]]:
-    """Where a patch's vividness falls to half of what it is inside: points [px] and outward directions."""
+    """Where a patch's vividness falls to half its inner value: points [px] and outward directions."""
     u, v = corner
     margin = 5
     top, first = max(v - margin, 0), max(u - margin, 0)
@@ -144,13 +144,13 @@ def contour(
 
 
 def sample(image: Float[np.ndarray, "H W"], points: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N"]:
-    """Values between pixels."""
+    """Interpolated values between pixels."""
     u, v = (np.ascontiguousarray(points[None, :, k], np.float32) for k in (0, 1))
     return cv2.remap(image, u, v, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[0]
 
 
 def level_rays(points: Float64[np.ndarray, "N 2"], camera: StereoCamera, at: Mount) -> Float64[np.ndarray, "N 3"]:
-    """Directions (forward, left, up) of the rays of pixels [px], one unit deep, as the camera is believed to sit."""
+    """Directions (forward, left, up) of the rays of pixels [px], one unit deep, for the believed camera pose."""
     x = (points[:, 0] - camera.centre[0]) / camera.focal
     y = (points[:, 1] - camera.centre[1]) / camera.focal
     cos, sin = np.cos(float(at.pitch)), np.sin(float(at.pitch))
@@ -173,7 +173,7 @@ def partner(blob: Blob, others: list[Blob], camera: StereoCamera, at: Mount, bel
 
 
 def measure(kind: int, left: Blob, right: Blob, camera: StereoCamera, at: Mount, below: float) -> Mark | None:
-    """The landmark that both patches show; None where they do not fit one.
+    """The landmark that both patches show; None if they do not fit one.
 
     Gauss-Newton over six numbers: the middle's (forward, left) and the depth of its plane below the camera [m], the
     robot's tilt forward and to the right [rad], and the yaw of a square [rad]. Depth and tilt have priors; without the
@@ -228,15 +228,16 @@ def residuals(
     """Distances [px] of contour points from the shape of a state, outwards, and which of them count.
 
     Args:
-      rays: of the points, and of points one pixel outwards.
-      eye: [m] where each ray begins, from the left camera.
+      rays: rays of the points, and of points one pixel outwards.
+      eye: [m] origin of each ray, relative to the left camera.
     """
     (off, counts), (further, _) = (distances(kind, state, places(state, ray, eye)) for ray in rays)
     return off / np.maximum(further - off, 1e-6), counts
 
 
 def tilting(state: Float64[np.ndarray, "6"]) -> Float64[np.ndarray, "3 3"]:
-    """Rotation of (forward, left, up), as believed, to those of a robot tilted as the state says; both are small."""
+    """Rotation of the believed (forward, left, up) to those of a robot tilted according to the state; both are
+    small."""
     pitch, roll = state[3:5]
     return np.array([[1, 0, pitch], [0, 1, roll], [-pitch, -roll, 1]])
 
@@ -244,7 +245,7 @@ def tilting(state: Float64[np.ndarray, "6"]) -> Float64[np.ndarray, "3 3"]:
 def places(
     state: Float64[np.ndarray, "6"], ray: Float64[np.ndarray, "N 3"], eye: Float64[np.ndarray, "N 3"]
 ) -> Float64[np.ndarray, "N 2"]:
-    """Where rays meet the plane of a state, from its middle [m]."""
+    """Where rays meet the plane of a state, relative to its middle [m]."""
     R = tilting(state)
     ray, eye = ray @ R.T, eye @ R.T
     reach = (-state[2] - eye[:, 2:]) / np.minimum(ray[:, 2:], -1e-3)
@@ -254,7 +255,7 @@ def places(
 def distances(
     kind: int, state: Float64[np.ndarray, "6"], place: Float64[np.ndarray, "N 2"]
 ) -> tuple[Float64[np.ndarray, "N"], Bool[np.ndarray, "N"]]:
-    """Distance [m] of places from the edge of a disc or a square around the origin, outwards; which of them count.
+    """Distance [m] of points from the edge of a disc or a square around the origin, outwards; which of them count.
 
     Near the corners of a square, which pixels round off, none does.
     """
@@ -265,7 +266,7 @@ def distances(
 
 
 def in_square(state: Float64[np.ndarray, "6"], place: Float64[np.ndarray, "N 2"]) -> Float64[np.ndarray, "N 2"]:
-    """Places along a square's own axes."""
+    """Points along a square's own axes."""
     cos, sin = np.cos(state[5]), np.sin(state[5])
     return place @ np.array([[cos, -sin], [sin, cos]])
 

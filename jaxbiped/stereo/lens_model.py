@@ -1,7 +1,7 @@
-"""Lens models in other people's calibration files: which of them OpenCV's pinhole with distortion fits.
+"""Lens models in other people's calibration files: those compatible with OpenCV's pinhole with distortion.
 
-A fisheye lens has four coefficients, as many as a pinhole with distortion, so that the numbers do not tell the two
-apart and the name must: taken for the other, its pictures bend by up to a hundred pixels.
+A fisheye lens has four coefficients, as many as a pinhole with distortion, so the numbers do not distinguish the two
+and the name must: if mistaken for the other, its pictures are distorted by up to a hundred pixels.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from jaxbiped.errors import InputError
 # Coefficients of all of these are in OpenCV's order: k1, k2, p1, p2, k3, ...
 FITTING = ("pinhole", "plumb_bob", "radtan", "rational_polynomial", "none")
 # fmt: off
-SAME = {  # the same in other words, small letters and digits alone
+SAME = {  # synonyms, in lower-case letters and digits only
     "", "pinhole", "perspective", "projective", "linear", "ideal", "opencv", "standard", "rectified", "distorted",
     "undistorted", "plumbbob", "radtan", "radialtan", "radialtangential", "brown", "brownconrady", "pinholeradtan",
     "pinholebrown", "rational", "rationalpolynomial", "none", "no", "null", "false", "0",
@@ -28,17 +28,17 @@ OTHER = re.compile(
     r"fish|equi|omni|mei|unified|sphere|eucm|kannala|kb4|ocam|scaramuzza|cata|panoram|cylind|prism|ftheta|^f?ov$|atan"
 )
 NAMES = re.compile(r"(camera|lens|distortion|dist|projection|intrinsics?)_?model|(distortion|projection)_?type")
-MAYBE = re.compile(r"model|type|lens|projection")  # may be of the camera's make, or of the file
+MAYBE = re.compile(r"model|type|lens|projection")  # may refer to the camera's make, or to the file
 FLAGS = re.compile(r"fish_?eye|omni_?dir|equidistant|equirectangular")
-XI = re.compile(r"(.*_)?xi(_?(\d|left|right|l|r))?")  # how far off its centre an omnidirectional mirror projects
+XI = re.compile(r"(.*_)?xi(_?(\d|left|right|l|r))?")  # eccentricity of an omnidirectional mirror's projection
 FALSE = ("", "0", "0.0", "false", "no", "off", "none")
 
 
 def check_lens_model(fields: Mapping[str, object], file: str | Path) -> None:
-    """Raise `InputError` where a calibration names a lens that is not a pinhole with OpenCV's distortion.
+    """Raise `InputError` if a calibration names a lens that is not a pinhole with OpenCV's distortion.
 
     Args:
-      fields: what the file holds, by its own names; mappings in it are looked into.
+      fields: the file's content, by its own names; nested mappings are searched.
       file: named in the message.
     """
     for key, value in fields.items():
@@ -46,7 +46,7 @@ def check_lens_model(fields: Mapping[str, object], file: str | Path) -> None:
         if isinstance(value, Mapping):
             check_lens_model(value, file)
         elif XI.fullmatch(name):
-            raise InputError(f"is of an omnidirectional lens: {allowed()}", file=file, field=str(key))
+            raise InputError(f"is for an omnidirectional lens: {allowed()}", file=file, field=str(key))
         elif FLAGS.search(name):
             if str(value).strip().lower() not in FALSE and not isinstance(value, list | tuple):
                 raise InputError(allowed(), file=file, field=str(key), value=value)
@@ -58,7 +58,7 @@ def check_lens_model(fields: Mapping[str, object], file: str | Path) -> None:
 
 
 def allowed() -> str:
-    """Which lenses are supported, for a message."""
+    """The supported lenses, for a message."""
     return f"must be one of {', '.join(FITTING)}; other lenses are not supported"
 
 

@@ -1,4 +1,4 @@
-"""Disparity of a rectified pair: OpenCV's semi-global matcher, and which of its pixels to believe."""
+"""Disparity of a rectified pair: OpenCV's semi-global matcher, and which of its pixels to trust."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from jaxbiped.errors import InputError
 from jaxbiped.stereo.semi_global import STEPS, MatchParams, agreement, search
 from jaxbiped.stereo.slanted import search_slanted
 
-SHARPER = 5.0  # [px] up to which the second search, more exact where it finds something, corrects the first
+SHARPER = 5.0  # [px] up to which the second search, which is more accurate, corrects the first
 
 
 @dataclass(frozen=True)
 class Disparity:
-    """Where each pixel of the left image is in the right one: at column x - value."""
+    """The position of each pixel of the left image in the right one: column x - value."""
 
     value: Float32[np.ndarray, "H W"]  # [px]; 0 where not valid
     valid: Bool[np.ndarray, "H W"]  # measured
@@ -28,12 +28,12 @@ class Disparity:
 def match(left: np.ndarray, right: np.ndarray, params: MatchParams | None = None) -> Disparity:
     """Disparity of a rectified pair of 8-bit images, grey [H, W] or RGB [H, W, 3].
 
-    Host code; the same result for any number of threads.
+    Host code; the result is the same for any number of threads.
 
-    A pixel is valid when the matcher is certain of it, its match lies inside the right image, and the gradients of both
-    images agree there (`MatchParams.agreement`). What is seen at a slant a second search measures (`slanted`). Small
-    patches of what is valid are dropped. Images are extended by the search range, so that no margin of the image is
-    lost. (Paper, 2.1; how it matches is not said there.)
+    A pixel is valid if the matcher is certain of it, its match lies inside the right image, and the gradients of both
+    images agree there (`MatchParams.agreement`). Slanted surfaces are measured by a second search (`slanted`). Small
+    valid patches are dropped. Images are extended by the search range, so that no margin of the image is lost. (Paper,
+    2.1, which does not describe the matching.)
 
     Raises:
       InputError: images of different size, of another type, or too wide for 32-bit numbers.

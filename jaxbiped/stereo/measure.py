@@ -1,4 +1,4 @@
-"""The rendered stereo camera: an arena in, points and landmarks out, by way of two pictures."""
+"""The rendered stereo camera: from an arena to points and landmarks, by way of two pictures."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from jaxbiped.stereo.points import to_points
 from jaxbiped.stereo.renderer import Pair, Renderer
 from jaxbiped.stereo.texture import textured
 
-STRIDE = 2  # pixels from a point to the next, across and down: a matcher's pixels hang together over more than that
+STRIDE = 2  # pixels from one point to the next, across and down: a matcher's pixels are correlated over more than that
 
 
 class StereoSensor:
-    """Renders what the robot sees, and measures it. To be used, and closed, in the thread that made it."""
+    """Renders the robot's view, and measures it. To be used, and closed, in the thread that created it."""
 
     def __init__(self, camera: CameraConfig):
         """
@@ -52,16 +52,16 @@ class StereoSensor:
         """One measurement; all arguments on the host, without a batch axis.
 
         Args:
-          arena: the true one; of it, the measuring itself reads only where landmarks are known to be.
-          origin, basis: of the left camera, truly (`camera.placed`).
-          at: where the camera is believed to sit on the robot.
-          believed: where the robot believes to stand; tells one landmark from another.
+          arena: the true one; the measurement itself only reads the known positions of landmarks from it.
+          origin, basis: true pose of the left camera (`camera.placed`).
+          at: believed pose of the camera on the robot.
+          believed: believed pose of the robot, to tell landmarks apart.
           max_range: [m] from the camera; points beyond are dropped.
-          spread: how well landmarks are measured.
-          seed: of the image noise.
+          spread: accuracy of landmark measurements.
+          seed: seed of the image noise.
 
         Returns:
-          The measurement; of nothing, and black, when the place is not finite.
+          The measurement; empty, and black, if the pose is not finite.
         """
         if not np.isfinite(np.sum(origin) + np.sum(basis)):
             return self.nothing(arena)
@@ -81,7 +81,7 @@ class StereoSensor:
     def measure(
         self, pair: Pair, arena: Arena, at: Mount, believed: Pose, max_range: float, spread: LandmarkNoise
     ) -> Shot:
-        """What a pair of pictures shows."""
+        """The measurement in a pair of pictures."""
         disparity = self.match(pair)
         floor = -float(believed.z)
         marks, patches = find(pair.left, pair.right, self.rig, at, floor)
@@ -92,13 +92,13 @@ class StereoSensor:
         return Shot(self.view(disparity, at, max_range), sightings, pair.left, disparity.value)
 
     def match(self, pair: Pair) -> Disparity:
-        """Disparities of what is textured (paper, 3.1: stereo is unstable on what is poor in texture)."""
+        """Disparities of textured pixels (paper, 3.1: stereo is unstable where texture is poor)."""
         found = match(pair.left, pair.right, self.params)
         valid = found.valid & textured(grey(pair.left), self.camera.image_noise)
         return Disparity(np.where(valid, found.value, np.float32(0)), valid)
 
     def nothing(self, arena: Arena) -> Shot:
-        """A measurement of nothing."""
+        """An empty measurement."""
         black = np.zeros((self.camera.height, self.camera.width, 3), np.uint8)
         blank = np.zeros(black.shape[:2], np.float32)
         none, points = np.zeros(np.shape(arena.landmarks.x), np.float32), blank[::STRIDE, ::STRIDE].reshape(-1)
@@ -117,5 +117,5 @@ class StereoSensor:
         return View(forward, left, up, np.where(near, np.float32(STRIDE**2), np.float32(0)))
 
     def close(self) -> None:
-        """Free what the graphics driver holds."""
+        """Free the resources of the graphics driver."""
         self.renderer.close()

@@ -1,4 +1,4 @@
-"""Is this a pair at all, and which of the two is the left one?"""
+"""Check that two pictures form a pair, and which of them is the left one."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 from jaxbiped.errors import InputError
 from jaxbiped.stereo.matching import MatchParams, grey, match
 
-WIDTH = 320  # [px] to which pictures are reduced: only how much matches is asked
-LEAST = 0.05  # of the pixels of a pair match; fewer do by chance
+WIDTH = 320  # [px] to which pictures are reduced: only the share of matches is needed
+LEAST = 0.05  # smallest share of matching pixels in a pair; fewer match by chance
 
 
 def check_order(left: np.ndarray, right: np.ndarray, params: MatchParams) -> None:
-    """Raise `InputError` when the rectified pictures are swapped, or no pair.
+    """Raise `InputError` if the rectified pictures are swapped, or not a pair.
 
-    Both orders are matched at reduced size. What cannot be seen shifted to the left in the right picture does not match
-    there: swapped, only what is infinitely far does, and what matches by chance.
+    Both orders are matched at reduced size. Surfaces that are not shifted to the left in the right picture do not
+    match: in swapped pictures, only infinitely distant surfaces do, and chance matches.
     """
     small = max(left.shape[1] / WIDTH, 1.0)
     shape = round(left.shape[1] / small), max(round(left.shape[0] / small), 1)
@@ -37,7 +37,7 @@ def check_order(left: np.ndarray, right: np.ndarray, params: MatchParams) -> Non
     if given < LEAST:
         low, high = params.min_disparity, params.min_disparity + params.num_disparities
         message = (
-            f"only {given:.1%} of the pixels match: the pictures are no rectified pair, show hardly any texture, or "
+            f"only {given:.1%} of the pixels match: the pictures are not a rectified pair, show hardly any texture, or "
             f"need another search range than {low} to {high} px"
         )
         raise InputError(message, field="left, right")

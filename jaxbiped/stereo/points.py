@@ -1,4 +1,4 @@
-"""Disparity to points: reprojection by a rectified camera."""
+"""From disparity to points: reprojection by a rectified camera."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from jaxbiped.errors import InputError
 from jaxbiped.stereo.calibration import StereoCamera
 from jaxbiped.stereo.matching import Disparity
 
-LEAST = 1.0 / 16  # [px] disparity of what is too far to have a distance
-USEFUL = 2.0, 27.2  # [m] to which maps are made of the paper's camera, of so many [px m] of focal length times baseline
+LEAST = 1.0 / 16  # [px] smallest disparity for which a distance is computed
+USEFUL = 2.0, 27.2  # [m] range of maps with the paper's camera, and its focal length times baseline [px m]
 
 
 class Points(NamedTuple):
-    """Points of one pair, one for each pixel of the left image, row after row, in the camera frame."""
+    """Points of one pair, one for each pixel of the left image, row by row, in the camera frame."""
 
     x: Float32[np.ndarray, "N"]  # [m] right
     y: Float32[np.ndarray, "N"]  # [m] down
     z: Float32[np.ndarray, "N"]  # [m] ahead
-    weight: Float32[np.ndarray, "N"]  # pixels: 1, or 0 where nothing was measured; such points lie at the origin
+    weight: Float32[np.ndarray, "N"]  # pixels: 1, or 0 where nothing was measured; such points are at the origin
 
 
 @checked()
@@ -37,7 +37,7 @@ def to_points(disparity: Disparity, camera: StereoCamera) -> Points:
     """
     height, width = disparity.value.shape
     if (width, height) != tuple(camera.size):
-        message = f"must be {camera.size[0]} x {camera.size[1]} px, as the camera says"
+        message = f"must be {camera.size[0]} x {camera.size[1]} px, as in the camera file"
         raise InputError(message, field="image", value=f"{width} x {height}")
     parallax = disparity.value + np.float32(camera.doffs)
     known = disparity.valid & (parallax >= LEAST) & (parallax < np.inf)
@@ -48,5 +48,5 @@ def to_points(disparity: Disparity, camera: StereoCamera) -> Points:
 
 
 def useful_range(camera: StereoCamera) -> float:
-    """[m] at which depth is as uncertain as at 2 m in the paper's camera: noise of depth grows as z^2 / (f b)."""
+    """[m] Range at which depth is as uncertain as at 2 m in the paper's camera: depth noise grows as z^2 / (f b)."""
     return USEFUL[0] * math.sqrt(camera.focal * camera.baseline / USEFUL[1])

@@ -1,4 +1,4 @@
-"""Rectification: pictures of two real cameras to pictures of two perfect, parallel ones."""
+"""Rectification: from pictures of two real cameras to those of two perfect, parallel ones."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from jaxbiped.stereo.matching import size
 
 @dataclass(frozen=True)
 class Rig:
-    """A calibrated pair, ready to be measured with."""
+    """A calibrated pair, ready for measurements."""
 
     camera: StereoCamera  # of the rectified pictures
-    maps: tuple[np.ndarray, ...] | None  # left (x, y) and right (x, y), for `cv2.remap`; None: rectified already
+    maps: tuple[np.ndarray, ...] | None  # left (x, y) and right (x, y), for `cv2.remap`; None: already rectified
     R_rectified_left: Float[np.ndarray, "3 3"]  # the left camera's frame to the rectified one
-    num_disparities: int | None = None  # [px] that suit the scene
+    num_disparities: int | None = None  # [px] suitable for the scene
     pose: PoseConfig | None = None  # of the left camera
 
     @property
     def up(self) -> Float[np.ndarray, "3"] | None:
-        """Against gravity, in the rectified frame, where the pose is known."""
+        """The direction opposite to gravity, in the rectified frame, if the pose is known."""
         return None if self.pose is None else self.R_rectified_left @ self.pose.up
 
     def rectify(self, left: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rectified pictures [H, W] or [H, W, 3] of a pair as its cameras gave it.
+        """Rectified pictures [H, W] or [H, W, 3] of a raw pair.
 
         Raises:
-          InputError: pictures of different size, or not of the size that was calibrated.
+          InputError: pictures of different size, or not of the calibrated size.
         """
         width, height = self.camera.size
         for image, field in ((left, "left"), (right, "right")):

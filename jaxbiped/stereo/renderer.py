@@ -17,15 +17,15 @@ from jaxbiped.errors import InputError
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.stereo.scene import arena_model
 
-NEAR, FAR = 0.01, 20.0  # [m] what is rendered lies between
-SAMPLES = 4  # of each pixel of an image
+NEAR, FAR = 0.01, 20.0  # [m] range of rendered depths
+SAMPLES = 4  # samples per pixel of an image
 PACKAGES = {"egl": "libegl1", "osmesa": "libosmesa6"}  # of Debian and Ubuntu
 MODULES = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa", "glfw": "mujoco.glfw", "cgl": "mujoco.cgl"}
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A left and a right image, and how deep what each pixel of the left one shows lies along the optical axis."""
+    """A left and a right image, and the depth of each pixel of the left one along the optical axis."""
 
     left: UInt8[np.ndarray, "H W 3"]
     right: UInt8[np.ndarray, "H W 3"]
@@ -33,12 +33,12 @@ class Pair:
 
 
 class Renderer:
-    """Renders one arena after the other. To be used, and closed, in the thread that made it."""
+    """Renders one arena after another. To be used, and closed, in the thread that created it."""
 
     def __init__(self, camera: CameraConfig):
         """
         Raises:
-          InputError: there is no OpenGL that works without a window.
+          InputError: no OpenGL works without a window.
         """
         self.camera = camera
         self.gl = context(camera.width, camera.height)
@@ -62,7 +62,7 @@ class Renderer:
         self.model = model
 
     def target(self, depth: bool) -> mujoco.MjrContext:
-        """Where to draw. Where pixels are drawn as the mean of several samples, depth is not that of their centres."""
+        """The render target. If pixels are the mean of several samples, depth is not that of their centres."""
         if depth not in self.targets:
             self.model.vis.quality.offsamples = 0 if depth else SAMPLES
             made = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_50)
@@ -78,17 +78,17 @@ class Renderer:
         seed: int,
         depth: bool = False,
     ) -> Pair:
-        """What the two cameras see.
+        """Render the views of the two cameras.
 
         Args:
-          origin: [m] of the left camera, world frame.
+          origin: [m] position of the left camera, world frame.
           basis: takes directions in the camera's frame (x right, y down, z forward) to the world's.
           noise: standard deviation of each channel of each pixel, in grey levels.
-          seed: of that noise.
-          depth: measure the left image's true depth too.
+          seed: seed of that noise.
+          depth: also measure the left image's true depth.
         """
         if threading.get_ident() != self.thread:
-            raise RuntimeError("OpenGL is to be used in the thread that began it")
+            raise RuntimeError("OpenGL must be used in the thread that created it")
         self.gl.make_current()
         origin, basis = np.asarray(origin, float), np.asarray(basis, float)
         left = self.picture(origin, basis)
@@ -106,42 +106,42 @@ class Renderer:
     def depth(self, eye: Float[np.ndarray, "3"], basis: Float[np.ndarray, "3 3"]) -> Float32[np.ndarray, "H W"]:
         """[m] along the optical axis; inf where there is nothing."""
         viewport, target = self.draw(eye, basis, depth=True)
-        share = np.empty((viewport.height, viewport.width), np.float32)  # of the nearest depth in this one, but for FAR
+        share = np.empty((viewport.height, viewport.width), np.float32)  # near depth over this one, except for FAR
         mujoco.mjr_readPixels(None, share, viewport, target)
         depth = NEAR * FAR / (np.flipud(share).astype(float) * (FAR - NEAR) + NEAR)
         return np.where(depth < 0.99 * FAR, depth, np.inf).astype(np.float32)
 
     def draw(self, eye, basis, depth: bool) -> tuple[mujoco.MjrRect, mujoco.MjrContext]:
-        """Draw what a camera sees, to be read."""
+        """Draw the view of a camera, to be read back."""
         camera = self.camera
         half_x, half_y = (NEAR * size / (2 * camera.focal) for size in (camera.width, camera.height))
-        for view in self.scene.camera:  # MuJoCo's own two eyes; one picture is drawn from their mean
+        for view in self.scene.camera:  # MuJoCo's own stereo cameras; one picture is drawn from their mean
             view.pos, view.forward, view.up = eye, basis[:, 2], -basis[:, 1]
             view.frustum_center, view.frustum_width = 0.0, half_x
             view.frustum_bottom, view.frustum_top = -half_y, half_y
             view.frustum_near, view.frustum_far = NEAR, FAR
         viewport = mujoco.MjrRect(0, 0, camera.width, camera.height)
-        self.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = not depth  # it has a depth of its own
+        self.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = not depth  # it has its own depth
         target = self.target(depth)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, target)
         mujoco.mjr_render(viewport, self.scene, target)
         return viewport, target
 
     def free(self) -> None:
-        """Free what was made for an arena."""
+        """Free the resources of an arena."""
         for target in self.targets.values():
             target.free()
         self.targets, self.scene = {}, None
 
     def close(self) -> None:
-        """Free what the graphics driver holds."""
+        """Free the resources of the graphics driver."""
         self.gl.make_current()
         self.free()
         self.gl.free()
 
 
 def grain(image: UInt8[np.ndarray, "H W 3"], noise: float, rng: np.random.Generator) -> UInt8[np.ndarray, "H W 3"]:
-    """An image with normal noise of a standard deviation in grey levels; a value of `rng` a number."""
+    """An image with normal noise of a standard deviation in grey levels; one value of `rng` per number."""
     values = rng.standard_normal(image.shape, np.float32)
     values *= np.float32(noise)
     values += image
@@ -149,7 +149,7 @@ def grain(image: UInt8[np.ndarray, "H W 3"], noise: float, rng: np.random.Genera
 
 
 def context(width: int, height: int):
-    """OpenGL without a window: what MUJOCO_GL names; else, on Linux, EGL or OSMesa, the first that works.
+    """OpenGL without a window: the one named by MUJOCO_GL; else, on Linux, the first of EGL and OSMesa that works.
 
     Raises:
       InputError: none works; names the package to install.
@@ -161,7 +161,7 @@ def context(width: int, height: int):
     for name in names:
         try:
             return opened(name, width, height)
-        except Exception as error:  # whatever the system's libraries raise
+        except Exception as error:  # any error of the system's libraries
             said = (str(error).strip() or type(error).__name__).splitlines()[0]
             reasons.append(f"{name}: {said}")
     wanted = " or ".join(PACKAGES[name] for name in names if name in PACKAGES)
@@ -170,7 +170,7 @@ def context(width: int, height: int):
 
 
 def opened(name: str, width: int, height: int):
-    """A current context of one kind. What PyOpenGL has loaded for another kind is forgotten first."""
+    """A current context of one kind. PyOpenGL's modules for another kind are unloaded first."""
     if os.environ.get("PYOPENGL_PLATFORM", name) != name and name in PACKAGES:
         for module in [
             m for m in sys.modules if m.split(".")[0] == "OpenGL" or m.startswith(("mujoco.egl", "mujoco.os"))

@@ -30,15 +30,15 @@ def is_ros(path: Path) -> bool:
 
 
 def read_ros(path: Path) -> dict:
-    """What `RawConfig` holds, of the file of one camera and the one beside it whose name says the other side.
+    """The fields of `RawConfig`, from the file of one camera and the file of the other camera beside it.
 
     Raises:
-      InputError: no other file, fields that are missing or of another shape, lenses that OpenCV's model does not fit,
+      InputError: no other file, fields that are missing or of another shape, lenses incompatible with OpenCV's model,
         pictures of different size, or no distance between the cameras.
     """
     side = next((side for side in SIDES if side in path.name), None)
     if side is None:
-        raise InputError("must have left or right in its name: the other camera's file is found by that", file=path)
+        raise InputError("must have left or right in its name, by which the other camera's file is found", file=path)
     other = path.with_name(path.name.replace(side, SIDES[side], 1))
     if not other.is_file():
         raise InputError(f"needs the calibration of the other camera beside it, {other.name}", file=path)
@@ -74,7 +74,7 @@ def read_camera(path: Path) -> dict:
     """Size, matrices and distortion of one file."""
     content = read_yaml(path)
     if not isinstance(content, dict):
-        raise InputError("is no calibration of a camera", file=path)
+        raise InputError("is not the calibration of a camera", file=path)
     check_lens_model(content, path)  # the calibrator writes distortion_model, camera_model or both
     found = {name: matrix(content, name, shape, path) for name, shape in SHAPES.items()}
     check_camera_matrix(found["camera_matrix"], path, "camera_matrix")
@@ -84,7 +84,7 @@ def read_camera(path: Path) -> dict:
     distortion = tuple(numbers(content, "distortion_coefficients", path))
     if str(content.get("distortion_model", "plumb_bob") or "none").lower() == "none":
         if any(distortion):
-            message = "must be named, for the coefficients of distortion are not 0"
+            message = "must be named, since the coefficients of distortion are not 0"
             raise InputError(message, file=path, field="distortion_model", value=content["distortion_model"])
         distortion = ()
     return found | {"size": size, "distortion": distortion}
@@ -95,7 +95,7 @@ def matrix(content: dict, name: str, shape: tuple[int, int], path: Path) -> Floa
     values = numbers(content, name, path)
     if len(values) != shape[0] * shape[1]:
         raise InputError(f"must hold {shape[0]} x {shape[1]} numbers", file=path, field=name, value=len(values))
-    if not np.any(values[: shape[1]]):  # an uncalibrated camera says so by zeros
+    if not np.any(values[: shape[1]]):  # zeros mean an uncalibrated camera
         raise InputError("is all zeros: this camera is not calibrated", file=path, field=name)
     return np.array(values).reshape(shape)
 

@@ -1,8 +1,8 @@
-"""An arena as pictures need it: a MuJoCo model of textured boxes, a floor, and landmarks that lie on it.
+"""An arena for rendering: a MuJoCo model of textured boxes, a floor, and landmarks on it.
 
-Each face carries several octaves of noise, a millimetre a texel, with an offset of its own, so that no two places look
-alike; where an arena says that a surface has little contrast, it has little. MuJoCo cannot scale a texture by face on
-its boxes, hence meshes with texture coordinates in metres.
+Each face carries several octaves of noise, one millimetre per texel, with its own offset, so that no two places look
+alike; surfaces with low contrast in the arena have low contrast here. MuJoCo cannot scale a texture per face on its
+boxes, hence meshes with texture coordinates in metres.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ TEXEL = 0.001  # [m]
 OCTAVES = 6  # of noise, from one texel to 2^5
 GREY, SPREAD = 128.0, 45.0  # mean and, at full contrast, standard deviation of a texture, in grey levels
 SHADES = 16  # steps of contrast; one texture each
-FLOOR_DEPTH = 0.05  # [m] that the floor's body reaches down
+FLOOR_DEPTH = 0.05  # [m] depth of the floor's body
 PRINT = 0.0001  # [m] thickness of a landmark
 FLOOR_TINT, BOX_TINT = (1.0, 0.98, 0.94, 1.0), (0.92, 0.97, 1.0, 1.0)
 RED, BLUE = (0.85, 0.06, 0.06, 1.0), (0.06, 0.16, 0.85, 1.0)
-SLICES = 180  # sides of the polygon that stands for a disc: it is within 0.02 mm of round
-SUN, AMBIENT, DIFFUSE = (0.35, 0.25, -1.0), 0.55, 0.45  # light from behind the start, the same from every side
+SLICES = 180  # sides of the polygon that represents a disc, accurate to 0.02 mm
+SUN, AMBIENT, DIFFUSE = (0.35, 0.25, -1.0), 0.55, 0.45  # light from behind the start, equal on all sides
 SKY = (0.80, 0.86, 0.92)
 
-# Faces of a box: outward axis, its sign, and the two axes along which the texture lies.
+# Faces of a box: outward axis, its sign, and the two axes of the texture.
 FACES = ((0, 1, 1, 2), (0, -1, 1, 2), (1, 1, 0, 2), (1, -1, 0, 2), (2, 1, 0, 1), (2, -1, 0, 1))
 
 
 def arena_model(arena: Arena) -> mujoco.MjModel:
-    """The model of one arena (no batch axis): nothing in it moves or touches.
+    """The model of one arena (no batch axis), without motion and contacts.
 
     Args:
       arena: contrasts are rounded to `1 / SHADES`.
@@ -72,7 +72,7 @@ def add_box(
     contrast: float,
     tint: tuple[float, float, float, float],
 ) -> None:
-    """A textured box; `number` names it and says where on the texture its faces lie."""
+    """A textured box; `number` names it and selects the texture offset of its faces."""
     shade = round(np.clip(contrast, 0, 1) * SHADES)
     material = f"shade_{shade}_{tint}"
     if spec.material(material) is None:
@@ -124,16 +124,16 @@ def about_z(yaw: float) -> tuple[float, float, float, float]:
 
 @functools.lru_cache(maxsize=SHADES + 1)
 def texels(shade: int) -> UInt8[np.ndarray, "n n 3"]:
-    """The texture of a contrast of shade / SHADES."""
+    """The texture with a contrast of shade / SHADES."""
     grey = GREY + SPREAD * shade / SHADES * octaves()
     return np.repeat(np.clip(np.round(grey), 0, 255).astype(np.uint8)[..., None], 3, axis=2)
 
 
 @functools.lru_cache(maxsize=1)
 def octaves() -> Float[np.ndarray, "n n"]:
-    """Noise of mean 0 and standard deviation 1 that goes on seamlessly over its borders; the same in every process.
+    """Noise of mean 0 and standard deviation 1 that continues seamlessly over its borders; the same in every process.
 
-    Octaves of equal strength: whatever the distance, there is detail of a few pixels.
+    Octaves of equal strength: at any distance, there is detail of a few pixels.
     """
     rng = np.random.default_rng(0)
     frequency = np.hypot(np.fft.fftfreq(TEXELS)[:, None], np.fft.rfftfreq(TEXELS)[None, :])

@@ -1,9 +1,9 @@
-"""What is beside the way: a second search for surfaces that one image shows much wider than the other.
+"""A second search for surfaces beside the path, which one image shows much wider than the other.
 
-A matcher compares windows of one size, and its path costs favour surfaces that face the camera. Of a wall that the
-robot walks along at 17 cm, on its right, the left image shows each piece twice as wide as the right one; on its left it
-is the other way round. Hardly any of it is matched. Halve the wider image's width, and both show it alike. (That slant
-makes a surface differ in width, and what a matcher can do about it: Ogale and Aloimonos, "Shape and the stereo
+A matcher compares windows of one size, and its path costs favour surfaces that face the camera. When the robot walks
+along a wall 17 cm to its right, the left image shows each piece twice as wide as the right one; for a wall on its left,
+it is the other way round. Hardly any of it is matched. With the wider image halved in width, both show it alike. (For
+the effect of slant on width, and what a matcher can do about it: Ogale and Aloimonos, "Shape and the stereo
 correspondence problem", International Journal of Computer Vision 65, 2005.)
 """
 
@@ -16,25 +16,25 @@ from jaxtyping import Bool, Float32, UInt8
 from jaxbiped.sensing.noise import LEAST_WIDTH
 from jaxbiped.stereo.semi_global import STEPS, MatchParams, agreement, search
 
-REACH = 6  # [px] of the left image to each side over which the slope of disparity is told
+REACH = 6  # [px] of the left image to each side over which the slope of disparity is measured
 TRIED = (
-    0.6  # of the first search's disparities, about those of a wall along the cameras' axis: 20 degrees to both sides
+    0.6  # of the first search's disparities, around those of a wall along the cameras' axis: 20 degrees to both sides
 )
-STRETCHES = 0.6, 4.0  # (`noise.stretch`) of what is kept; what faces the camera more is the first search's
+STRETCHES = 0.6, 4.0  # (`noise.stretch`) range kept; surfaces that face the camera more are the first search's
 HALF = np.float32(0.5)
-WHOLE = 5  # halved pixels across and down that what is kept is made of: thinner strips are rims of other things
+WHOLE = 5  # smallest size of kept regions in halved pixels, across and down: thinner strips are rims of other surfaces
 
 
 def search_slanted(
     left: UInt8[np.ndarray, "H W"], right: UInt8[np.ndarray, "H W"], params: MatchParams
 ) -> tuple[Float32[np.ndarray, "H W"], Bool[np.ndarray, "H W"]]:
-    """Disparities [px] of what is seen at such a slant, and where there are any; 0 elsewhere.
+    """Disparities [px] of such slanted surfaces, and where there are any; 0 elsewhere.
 
     Both images are halved down as well: such surfaces are near, and large.
 
     Args:
       left, right: a rectified pair.
-      params: as of the first search.
+      params: as for the first search.
     """
     value, valid = np.zeros(left.shape, np.float32), np.zeros(left.shape, bool)
     high, wide = left.shape[0] // 2, left.shape[1] // 2
@@ -85,19 +85,19 @@ def falling(left: UInt8[np.ndarray, "H W"], right: UInt8[np.ndarray, "H W"], par
 
 
 def columns_tried(params: MatchParams) -> int:
-    """How many matches are tried for each column; a multiple of 16."""
+    """Number of matches tried for each column; a multiple of 16."""
     return max(int(TRIED * params.num_disparities) // 16, 1) * 16
 
 
 def halves(wider: UInt8[np.ndarray, "H W"], other: UInt8[np.ndarray, "H W"], tried: int, offset: int):
-    """The wider image at half its width, the same with a margin, and what may match it of the other image: the columns
-    from which one on. Both are halved down.
+    """The wider image at half its width, the same with a margin, the part of the other image that may match it, and the
+    column where that begins. All are halved down.
 
-    Of a wall along the axis of the cameras, column u of the halved image is W / 4 columns further right in the other.
+    For a wall along the axis of the cameras, column u of the halved image is W / 4 columns farther right in the other.
 
     Args:
-      tried: [px] columns that are tried for each.
-      offset: [px] by which cameras that squint shift these.
+      tried: [px] columns tried for each.
+      offset: [px] shift of these for cameras that squint.
     """
     wide = wider.shape[1] // 2
     narrow = cv2.resize(wider, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
@@ -113,7 +113,7 @@ def halves(wider: UInt8[np.ndarray, "H W"], other: UInt8[np.ndarray, "H W"], tri
 def slopes(
     disparity: Float32[np.ndarray, "h w"], valid: Bool[np.ndarray, "h w"], reach: int
 ) -> tuple[Float32[np.ndarray, "h w"], Bool[np.ndarray, "h w"]]:
-    """Slope of disparity [px/px of the left image] across, and where there is one to both sides, both up or down.
+    """Slope of disparity [px/px of the left image] across, and where it is defined on both sides, both up or down.
 
     Args:
       reach: columns to each side; `REACH` pixels of the left image.
@@ -136,5 +136,5 @@ def inside(column: Float32[np.ndarray, "..."], width: int) -> Bool[np.ndarray, "
 
 
 def whole(mask: Bool[np.ndarray, "h w"], columns: int) -> Bool[np.ndarray, "h w"]:
-    """A mask without what is thinner than `WHOLE` rows, or so many columns."""
+    """A mask without regions thinner than `WHOLE` rows, or this many columns."""
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, np.ones((WHOLE, columns), np.uint8)).astype(bool)

@@ -1,10 +1,10 @@
-"""Visual odometry: how the robot moved between two measurements, from what the pictures of both show.
+"""Visual odometry: the robot's motion between two measurements, from their pictures.
 
-Scale-invariant features (Lowe, 2004) of the left pictures, each with the disparity that the matcher gave there, are
-matched by their descriptors, since a robot that turns by 45 degrees between two pictures loses whatever follows pixels.
-Three matches fix a rigid motion; the one that most matches agree with is refined on all of these by least squares in
-columns, rows and disparities, where the errors are even. The motion has all six degrees of freedom: a body that sways
-by half a degree would else be taken for one that walked.
+Scale-invariant features (Lowe, 2004) of the left pictures, each with the disparity found by the matcher, are matched by
+their descriptors, since a robot that turns by 45 degrees between two pictures defeats pixel tracking. Three matches
+determine a rigid motion; the one supported by most matches is refined on all of these by least squares in columns, rows
+and disparities, where the errors are uniform. The motion has all six degrees of freedom: otherwise a body that sways by
+half a degree would be mistaken for one that walked.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ from jaxbiped.sensing.view import Motion
 from jaxbiped.stereo.calibration import StereoCamera
 from jaxbiped.stereo.matching import grey
 
-MOST = 800  # features of a picture
-RATIO = 0.8  # of the distances of the best and the second best match (Lowe, 2004, 7.1)
-HYPOTHESES = 200  # motions that are tried
+MOST = 800  # most features of a picture
+RATIO = 0.8  # ratio of the distances of the best and the second best match (Lowe, 2004, 7.1)
+HYPOTHESES = 200  # number of motions tried
 SPREAD = np.array([0.6, 0.6, 0.3])  # [px] standard deviations of a match in column, row and disparity
-FAR = 16.3  # squared distance in these beyond which a match is wrong: one good one in 1,000 is
-TILT, CLIMB = np.deg2rad(6.0), 0.06  # [rad, m] by which a robot may tilt, and rise or sink, from view to view
-ASTRAY, TURNED = 0.05, 0.15  # [m, rad] by which dead reckoning may be off
-LEAST = 12  # matches that must agree on a motion
-ROUNDS = 8  # of least squares
-KEPT = 256  # views: of more robots than walk at once
-INFLATION = 2.0  # of the covariance: errors of neighbours are alike (`sweeps/studies/visual_odometry.py`)
+FAR = 16.3  # squared distance in these units beyond which a match is wrong: true for one good match in 1,000
+TILT, CLIMB = np.deg2rad(6.0), 0.06  # [rad, m] limits of a robot's tilt and vertical motion from view to view
+ASTRAY, TURNED = 0.05, 0.15  # [m, rad] largest error of dead reckoning
+LEAST = 12  # fewest matches that must agree on a motion
+ROUNDS = 8  # rounds of least squares
+KEPT = 256  # views kept: more than the robots that walk at once
+# Of the covariance: errors of neighbours are correlated (`sweeps/studies/visual_odometry.py`).
+INFLATION = 2.0
 
 
 @dataclass(frozen=True)
 class Features:
-    """What can be found again of one measurement."""
+    """What can be recognised again from one measurement."""
 
     seen: Float[np.ndarray, "n 3"]  # [px] column, row, disparity
     points: Float[np.ndarray, "n 3"]  # [m] in the robot frame, for a robot that stands upright
@@ -56,13 +57,13 @@ def find_features(
     origin = np.array([float(at.forward), 0.0, float(at.height)])
     measured = (disparity != 0) & (disparity + camera.doffs > 0)
     mask = measured.astype(np.uint8)
-    # Precise: else all features lie a quarter of a pixel off, which is 0.4 mm in each turn.
+    # Precise: otherwise all features are shifted by a quarter of a pixel, which is 0.4 mm in each turn.
     found, descriptors = cv2.SIFT_create(nfeatures=MOST, enable_precise_upscale=True).detectAndCompute(picture, mask)
     if not found:
         nothing = np.zeros((0, 3))
         return Features(nothing, nothing, np.zeros((0, 128), np.float32), R, origin)
     place = np.array([feature.pt for feature in found])
-    # A place may have several features, one for each direction of its gradient: one is enough.
+    # A position may have several features, one for each gradient direction: one is enough.
     place, first = np.unique(place, axis=0, return_index=True)
     column, row = np.rint(place).astype(int).T
     d, good = disparity[row, column].astype(float), measured[row, column]
@@ -80,11 +81,11 @@ def to_robot(seen, camera: StereoCamera, R, origin) -> Float[np.ndarray, "n 3"]:
 def find_motion(
     before: Features, after: Features, camera: StereoCamera, expected: Float[np.ndarray, "3"], seed: int = 0
 ) -> Motion:
-    """The robot's motion from one measurement to the next; `seen` is off where too few matches agree on one.
+    """The robot's motion from one measurement to the next; `seen` is False if too few matches agree on one.
 
     Args:
-      expected: (x, y, yaw) [m, m, rad] by dead reckoning: a floor that looks the same in two places leads astray.
-      seed: of the motions that are tried.
+      expected: (x, y, yaw) [m, m, rad] by dead reckoning: a floor that looks the same in two places is misleading.
+      seed: seed of the motions tried.
     """
     a, b = matches(after.descriptors, before.descriptors)
     points, goal = after.points[a], before.seen[b]
@@ -112,7 +113,7 @@ def find_motion(
 
 
 class Tracker:
-    """Keeps what was found in the last views, by name, and tells the motion from one to the next."""
+    """Keeps the features of the last views, by name, and returns the motion from one to the next."""
 
     def __init__(self, camera: StereoCamera):
         self.camera = camera
@@ -129,7 +130,7 @@ class Tracker:
 
 
 def no_motion() -> Motion:
-    """Nothing was found."""
+    """The result if nothing was found."""
     return Motion(*np.zeros(3, np.float32), np.zeros((3, 3), np.float32), np.bool_(False))
 
 
@@ -148,7 +149,7 @@ def matches(
 
 
 def propose(points, goal_points, goal, before: Features, camera: StereoCamera, expected, rng: np.random.Generator):
-    """The motion (R, t) through three matches that most matches agree with; None where too few do."""
+    """The motion (R, t) through three matches that is supported by most matches; None if by too few."""
     if len(points) < LEAST:
         return None
     three = np.argsort(rng.random((HYPOTHESES, len(points))), axis=1)[:, :3]
@@ -164,7 +165,7 @@ def propose(points, goal_points, goal, before: Features, camera: StereoCamera, e
 
 
 def possible(R: Float[np.ndarray, "*k 3 3"], t: Float[np.ndarray, "*k 3"], expected) -> Bool[np.ndarray, "*k"]:
-    """Whether a robot can have moved so: it tilts little, climbs a step at most, and is about where it expects."""
+    """Whether a motion is possible for a robot: little tilt, a climb of at most a step, and about as expected."""
     turned = np.arctan2(R[..., 1, 0], R[..., 0, 0]) - expected[2]
     near = np.hypot(t[..., 0] - expected[0], t[..., 1] - expected[1]) < ASTRAY
     near &= np.abs(np.angle(np.exp(1j * turned))) < TURNED
@@ -182,7 +183,7 @@ def rigid(points: Float[np.ndarray, "k n 3"], goal: Float[np.ndarray, "k n 3"]):
 
 
 def project(points, before: Features, camera: StereoCamera):
-    """Columns, rows and disparities [..., 3] [px] of points [..., 3] [m] in the robot frame; far off behind it."""
+    """Columns, rows and disparities [..., 3] [px] of points [..., 3] [m] in the robot frame; far away behind it."""
     x, y, z = np.moveaxis((points - before.origin) @ before.R, -1, 0)
     inverse = np.where(z > 1e-3, 1 / np.where(z > 1e-3, z, 1.0), 1e6)
     return np.stack(

@@ -1,4 +1,4 @@
-"""The axes of a sweep: which values each field takes."""
+"""The axes of a sweep: the values that each field takes."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from jaxtyping import Float
 from jaxbiped.config import Model
 from jaxbiped.config import told as told
 
-MOST = 1_000_000  # values of an axis
+MOST = 1_000_000  # most values of an axis
 
 Values = Annotated[tuple[float, ...], pydantic.Field(min_length=1, max_length=MOST)]
 Bounds = tuple[float, float]
 
 
 class Range(Model):
-    """Evenly spaced values, both ends among them."""
+    """Evenly spaced values, including both ends."""
 
     start: float
     stop: float
     num: Annotated[int, pydantic.Field(ge=2, le=MOST)]
-    """How many."""
+    """Number of values."""
 
     @pydantic.model_validator(mode="after")
     def _rises(self):
@@ -31,7 +31,7 @@ class Range(Model):
         return self
 
     def logarithmic(self) -> bool:
-        """Whether it is the logarithms that are evenly spaced."""
+        """Whether the logarithms are evenly spaced."""
         return False
 
     def numbers(self) -> tuple[float, ...]:
@@ -40,7 +40,7 @@ class Range(Model):
 
 
 class LogRange(Range):
-    """Values with a constant ratio, both ends among them."""
+    """Values with a constant ratio, including both ends."""
 
     def logarithmic(self) -> bool:
         return True
@@ -58,7 +58,7 @@ class Axis(Model):
     range: Range | None = None
     log_range: LogRange | None = None
     together: dict[str, Values] = pydantic.Field(default_factory=dict)
-    """Other fields that change along with it, with a value for each of its values."""
+    """Other fields that change along with it, with one value for each of its values."""
 
     @pydantic.model_validator(mode="after")
     def _one_way(self):
@@ -67,10 +67,10 @@ class Axis(Model):
             told(f"{self.field}: give exactly one of values, range and log_range, not {' and '.join(given) or 'none'}")
         numbers = self.numbers()
         if len(set(numbers)) < len(numbers):
-            told(f"{self.field}: each value must come once, in {list(numbers)}")
+            told(f"{self.field}: values must be distinct, in {list(numbers)}")
         for name, others in self.together.items():
             if len(others) != len(numbers):
-                told(f"{self.field}: together.{name} must have {len(numbers)} values, one each, not {len(others)}")
+                told(f"{self.field}: together.{name} must have {len(numbers)} values, one per value, not {len(others)}")
         return self
 
     def numbers(self) -> tuple[float, ...]:
@@ -87,13 +87,13 @@ class Sobol(Model):
     """Points that fill a box evenly: a scrambled Sobol sequence (`scipy.stats.qmc.Sobol`)."""
 
     points: Annotated[int, pydantic.Field(ge=1, le=MOST)]
-    """How many; a power of 2, for which the sequence is balanced."""
+    """Number of points; a power of 2, for which the sequence is balanced."""
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Of the scrambling."""
+    """Seed of the scrambling."""
     range: dict[str, Bounds] = pydantic.Field(default_factory=dict)
-    """Field: its lowest and highest value."""
+    """Lowest and highest value of each field."""
     log_range: dict[str, Bounds] = pydantic.Field(default_factory=dict)
-    """The same, spread evenly by the logarithm."""
+    """The same for fields that are spaced evenly in their logarithm."""
 
     @pydantic.model_validator(mode="after")
     def _sound(self):
@@ -101,7 +101,7 @@ class Sobol(Model):
             less = 2 ** (self.points.bit_length() - 1)
             told(f"points must be a power of 2, such as {less} or {2 * less}, not {self.points}")
         if not self.names():
-            told("needs a range or a log_range of one field at least")
+            told("needs a range or a log_range of at least one field")
         for name in set(self.range) & set(self.log_range):
             told(f"{name}: must be in one of range and log_range")
         for log, box in ((False, self.range), (True, self.log_range)):
@@ -130,12 +130,12 @@ class Sobol(Model):
 
 
 def plain(numbers: Float[np.ndarray, "n"]) -> tuple[float, ...]:
-    """With twelve digits: 10, where a power of a root gives 10.000000000000002."""
+    """Values rounded to twelve digits: 10, where a power of a root gives 10.000000000000002."""
     return tuple(float(f"{number:.12g}") for number in numbers)
 
 
 def check_bounds(bounds: Bounds, low: str, high: str, log: bool) -> None:
-    """Raise about a range that does not rise, or that has no logarithm."""
+    """Raise about a range that does not increase, or that has no logarithm."""
     if bounds[1] <= bounds[0]:
         told(f"{low} must be below {high}: {bounds[0]:g} is not below {bounds[1]:g}")
     if log and bounds[0] <= 0:

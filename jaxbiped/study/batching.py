@@ -1,4 +1,4 @@
-"""Which sweep points share a compiled program, and the shards that a study is computed and written in."""
+"""Sweep points that share a compiled program, and the shards in which a study is computed and written."""
 
 from __future__ import annotations
 
@@ -37,33 +37,33 @@ class Point:
     index: int
     mission: MissionConfig
     population: PopulationConfig
-    values: dict[str, float] = field(default_factory=dict)  # dotted field of the config: its value here
-    own: dict[str, float] = field(default_factory=dict)  # of these, the numbers of components: `planner.clearance`
+    values: dict[str, float] = field(default_factory=dict)  # values of dotted fields of the config
+    own: dict[str, float] = field(default_factory=dict)  # those of components, such as `planner.clearance`
 
 
 @dataclass(frozen=True)
 class Group:
-    """Points and strategies that differ in traced numbers alone: `P` points, `S` strategies, one compiled program."""
+    """Points and strategies that differ only in traced numbers: `P` points, `S` strategies, one compiled program."""
 
     kind: ArenaKind
     static: MissionSpec
-    walk: WalkConfig | None  # of simulated bipeds
-    camera: CameraConfig | None  # of sensors that measure on the host
-    points: tuple[int, ...]  # indices of the points, rising
+    walk: WalkConfig | None  # for simulated bipeds
+    camera: CameraConfig | None  # for sensors that measure on the host
+    points: tuple[int, ...]  # indices of the points, ascending
     strategies: tuple[str, ...]  # their names
     settings: MissionParams  # [P * S], strategy by strategy within a point
-    populations: Population | None  # [U], those that differ; None: nothing is fixed in any
+    populations: Population | None  # [U], the distinct ones; None: no population fixes anything
     population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
     metrics: tuple[str, ...] = ()  # columns of the metrics of the settings
 
     def rows(self, shard: Shard) -> int:
-        """How many a shard of this group has."""
+        """Number of rows in a shard of this group."""
         return self.kind.count(shard.first, shard.count) * len(self.population_of)
 
 
 @dataclass(frozen=True)
 class Shard:
-    """A block of arenas, those of a group's kind, under all its points: what one call computes, and one file holds."""
+    """A block of a group's arenas under all its points: computed in one call and stored in one file."""
 
     number: int
     group: int
@@ -72,7 +72,7 @@ class Shard:
 
 
 def only_point(config: StudyConfig) -> tuple[Point, ...]:
-    """A study that sweeps nothing."""
+    """The point of a study that sweeps nothing."""
     return (Point(0, config.mission, config.population),)
 
 
@@ -80,7 +80,7 @@ def strategies_of(config: StudyConfig) -> tuple[Strategy, ...]:
     """The strategies of a study, in its order.
 
     Raises:
-      InputError: a name that is not known, a module that cannot be imported, two strategies of one name.
+      InputError: an unknown name, a module that cannot be imported, two strategies with one name.
     """
     found = tuple(find_strategy(name) for name in config.strategies)
     for k, item in enumerate(found):
@@ -90,10 +90,10 @@ def strategies_of(config: StudyConfig) -> tuple[Strategy, ...]:
 
 
 def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
-    """The families of a study, in their turns.
+    """The families of a study, in their order.
 
     Raises:
-      InputError: one that is not known, a scene that is wrong, two of one name.
+      InputError: an unknown family, a bad scene, two with one name.
     """
     found = tuple(map(find_family, config.families))
     names = [name_of(item) for item in found]
@@ -102,7 +102,7 @@ def families_of(config: StudyConfig) -> tuple[str | OwnFamily, ...]:
             raise InputError("two of them have this name", field="families", value=name)
     moving = MOVING & set(names)
     if moving and not all(isinstance(item, str) for item in found):
-        raise InputError("moves, and goes with families that are built in only", field="families", value=min(moving))
+        raise InputError("moves, and can only be combined with built-in families", field="families", value=min(moving))
     return found
 
 
@@ -110,7 +110,7 @@ def metrics_of(config: StudyConfig) -> dict[str, Metric]:
     """The metrics of a study by their columns, in its order.
 
     Raises:
-      InputError: a name that is not known, a module that cannot be imported, two of one column, or a column that all
+      InputError: an unknown name, a module that cannot be imported, two metrics with one column, or a column that all
         rows have.
     """
     found: dict[str, Metric] = {}
@@ -129,17 +129,17 @@ def group_points(
     metrics: Mapping[str, Metric] | None = None,
     numbers: Mapping[str, float] | None = None,
 ) -> tuple[Group, ...]:
-    """Points by what sets array shapes and code paths (`mission.program`), in the order of their first.
+    """Group points by what sets array shapes and code paths (`mission.program`), in order of first occurrence.
 
-    Strategies whose planners are of different kinds are groups of their own.
+    Strategies whose planners are of different kinds get separate groups.
 
     Args:
-      kinds: of arenas.
-      metrics: by their columns.
-      numbers: of components, by their dotted names, where a point has none of its own.
+      kinds: kinds of arenas.
+      metrics: metrics by their columns.
+      numbers: numbers of components by their dotted names, for points that have none of their own.
 
     Raises:
-      InputError: a point whose grid does not fit an area, or whose sensor or executor does not know a terrain.
+      InputError: a point whose grid does not fit an area, or whose sensor or executor does not support a terrain.
     """
     strategies = [find_strategy(item) if isinstance(item, str) else item for item in strategies]
     points = tuple(replace(point, own={**(numbers or {}), **point.own}) for point in points)
@@ -177,15 +177,15 @@ def check_numbers(own: Iterable[str], mission: MissionConfig, strategies: Sequen
 
 
 def numbers_under(kind: str, numbers: Mapping[str, float]) -> dict[str, float]:
-    """Those of a kind of component, by their own names."""
+    """The numbers of a kind of component, by their own names."""
     return {name.removeprefix(f"{kind}."): value for name, value in numbers.items() if name.startswith(f"{kind}.")}
 
 
 def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tuple[Group, ...]:
-    """The groups of a study, or of the sweep that has these points.
+    """The groups of a study, or of a sweep with these points.
 
     Raises:
-      InputError: strategies, families or points that do not go together.
+      InputError: strategies, families or points that cannot be combined.
     """
     kinds = kinds_of(families_of(config))
     return group_points(points or only_point(config), strategies_of(config), kinds, metrics_of(config), config.numbers)
@@ -200,7 +200,7 @@ def group(
     strategies: Sequence[Strategy],
     metrics: Mapping[str, Metric],
 ) -> Group:
-    """The points of one program."""
+    """The group of the points of one program."""
     settings, measured = [], tuple(traced_component(metric) for metric in metrics.values())
     for point in points:
         first = point.mission.settings(strategies[0])
@@ -232,7 +232,7 @@ def shards(config: StudyConfig, groups: int, *, swept: bool = False) -> tuple[Sh
     """All shards of a study; a function of the config alone.
 
     They are numbered block by block, so that a study that ends early has all strategies on its arenas. Those of a sweep
-    are numbered group by group: a program is compiled when the one before it is no longer needed.
+    are numbered group by group, so that a program is compiled when the previous one is no longer needed.
     """
     size = min(config.shard, config.arenas)
     firsts = range(0, config.arenas, size)

@@ -9,9 +9,9 @@ import jax
 
 
 class CompileClock:
-    """Seconds during which this process was tracing, lowering or compiling, by JAX's own account.
+    """Seconds that this process spent tracing, lowering or compiling, as reported by JAX.
 
-    JAX reports a stretch of time as it ends, and those within it before: what lies within another counts once.
+    JAX reports an interval when it ends, after those nested in it: nested intervals count only once.
     """
 
     EVENTS = (
@@ -21,7 +21,7 @@ class CompileClock:
     )
 
     def __init__(self):
-        self.stretches: list[tuple[float, float]] = []  # that do not overlap: begin, end
+        self.stretches: list[tuple[float, float]] = []  # disjoint: begin, end
         self.lock = threading.Lock()
         jax.monitoring.register_event_duration_secs_listener(self.listen)
 
@@ -31,7 +31,7 @@ class CompileClock:
             self.add(end - duration, end)
 
     def add(self, begin: float, end: float) -> None:
-        """Count a stretch that ends after all that were counted before."""
+        """Count an interval that ends after all that were counted before."""
         with self.lock:
             while self.stretches and self.stretches[-1][1] > begin:
                 begin = min(begin, self.stretches.pop()[0])
@@ -39,6 +39,6 @@ class CompileClock:
 
     @property
     def seconds(self) -> float:
-        """All of them."""
+        """The total."""
         with self.lock:
             return sum((end - begin for begin, end in self.stretches), 0.0)

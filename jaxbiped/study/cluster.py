@@ -1,8 +1,8 @@
-"""A study on many machines: Dask hands shards to worker processes, and this process writes what comes back.
+"""A study on many machines: Dask hands shards to worker processes, and this process writes the results.
 
-A shard is one task. It is a function of the study's config and of its number alone, so that a task whose worker died is
-computed by another one, and the rows are those of a study on one machine. A worker computes one shard at a time,
-by as many queues as it has threads, and compiles for itself: processes share compilations only where JAX keeps them
+A shard is one task. It is a function of the study's config and of its number alone, so that a task whose worker died
+is computed by another one, and the rows equal those of a study on one machine. A worker computes one shard at a time,
+with as many queues as it has threads, and compiles for itself: processes share compilations only if JAX keeps them
 on disk, in the folder that the environment variable JAX_COMPILATION_CACHE_DIR names to each of them.
 """
 
@@ -40,10 +40,10 @@ from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluation import Progress
 from jaxbiped.study.worker import Compute
 
-ANSWER = 5.0  # [s] for the scheduler to answer
-WAITING = 30.0  # [s] for a worker to come, where there is none
-LOOK = 1.0  # [s] between two looks at which workers there are
-# What a worker runs first: an interrupt from the terminal is meant for the client, which ends them.
+ANSWER = 5.0  # [s] time limit for the scheduler to answer
+WAITING = 30.0  # [s] time limit for a worker to appear, if there is none
+LOOK = 1.0  # [s] between two checks of the workers
+# What a worker runs first: an interrupt from the terminal is meant for the client, which ends the workers.
 DEAF = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 LOST = (CancelledError, CommClosedError, OSError)  # what Dask raises when the scheduler is gone
 
@@ -52,21 +52,21 @@ class Cluster:
     """An engine of `conduct`: shards computed by the workers of a Dask scheduler.
 
     Args:
-      client: connected. All its workers are checked now, those that join later with their first shard.
-      ordered: give shards in the order of their numbers, which a rule that may end the study needs: the order in which
-        they end depends on what is in them.
-      compute: called as `evaluate.compute`, on a worker.
+      client: a connected client. All its workers are checked now, those that join later with their first shard.
+      ordered: return shards in order of their numbers, as required by a rule that may end the study: the order in which
+        they end depends on their content.
+      compute: called like `evaluate.compute`, on a worker.
 
     Raises:
-      InputError: no worker comes, or one with other versions or another kind of device than the rest; while shards
+      InputError: no worker appears, or one has other versions or another kind of device than the rest; while shards
         are computed also: the scheduler or all workers are gone, or several workers died of one shard.
     """
 
     def __init__(self, client: Client, *, ordered: bool = False, compute: Compute = evaluation.compute):
         self.client, self.ordered, self.compute = client, ordered, compute
         self.address = client.scheduler.address
-        self.compiling: dict[str, float] = {}  # [s] of each worker
-        self.seen = time.monotonic()  # when there was a worker
+        self.compiling: dict[str, float] = {}  # [s] for each worker
+        self.seen = time.monotonic()  # last time that there was a worker
         while not self.workers():
             time.sleep(0.1)
         self.versions = worker.versions()
@@ -81,7 +81,7 @@ class Cluster:
 
     @property
     def seconds(self) -> float:
-        """Spent compiling, by the worker that compiled longest: they compile side by side."""
+        """Compile time of the worker that compiled longest, since they compile in parallel."""
         return max(self.compiling.values(), default=0.0)
 
     def __call__(
@@ -92,7 +92,7 @@ class Cluster:
         points: Sequence[Point] | None = None,
         done: Collection[int] = (),
     ) -> Iterator[tuple[Shard, pl.DataFrame]]:
-        """As `evaluate.evaluate`."""
+        """Evaluate shards like `evaluate.evaluate`."""
         groups = groups_of(config, points)
         left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
         total = sum(groups[shard.group].rows(shard) for shard in left)
@@ -100,14 +100,14 @@ class Cluster:
         board, topic = Board(on_progress, total), f"jaxbiped-{uuid.uuid4()}"
         todo = iter(left)
         running: dict[Future, Shard] = {}
-        held: dict[int, tuple[Shard, pl.DataFrame]] = {}  # that wait for those before them
+        held: dict[int, tuple[Shard, pl.DataFrame]] = {}  # waiting for earlier ones
         turns = [shard.number for shard in reversed(left)]  # the next one last
         self.client.subscribe_topic(topic, board.hear)
         self.seen = time.monotonic()
         try:
             while turns:
-                # As many shards as workers, so that none waits at a worker while another one has nothing to do. Where
-                # their order counts, not far beyond the one whose turn it is.
+                # As many shards as workers, so that none waits at a worker while another worker is idle. If
+                # their order matters, not far beyond the next one.
                 count = self.workers()
                 room = min(count - len(running), 2 * count - len(running) - len(held))
                 for shard in islice(todo, max(0, room)):
@@ -126,13 +126,13 @@ class Cluster:
                 self.client.cancel(list(running))
 
     def submit(self, config: StudyConfig, group: Group, shard: Shard, topic: str) -> Future:
-        """A shard as a task."""
+        """Submit a shard as a task."""
         arguments = self.compute, config, group, shard, topic, self.versions, self.kind
         with self.connection():
             return self.client.submit(worker.work, *arguments, key=f"shard-{shard.number}-{topic}", pure=False)
 
     def ended(self, running: Collection[Future]) -> list[Future]:
-        """Those that have ended, after at most `LOOK` seconds."""
+        """The tasks that have ended, after at most `LOOK` seconds."""
         with self.connection(), self.client.as_current():
             if not running:
                 time.sleep(LOOK)
@@ -144,13 +144,11 @@ class Cluster:
         return [future for future in running if future in done]
 
     def result(self, future: Future, shard: Shard) -> pl.DataFrame:
-        """The rows of a task that has ended."""
+        """The rows of a completed task."""
         if future.status == "error":
             error = future.exception()
             if isinstance(error, KilledWorker):
-                message = (
-                    "its workers died, one after the other, of too little memory perhaps: a smaller --shard needs less"
-                )
+                message = "its workers died one after another, perhaps for lack of memory: a smaller --shard needs less"
                 raise InputError(message, field=f"shard {shard.number}")
             raise error
         with self.connection():
@@ -159,7 +157,7 @@ class Cluster:
         return frame
 
     def workers(self) -> int:
-        """How many there are; `InputError` when there has been none for too long."""
+        """The number of workers; `InputError` if there has been none for too long."""
         with self.connection():
             count = len(self.client.nthreads())
         if count:
@@ -171,16 +169,16 @@ class Cluster:
 
     @contextlib.contextmanager
     def connection(self) -> Iterator[None]:
-        """Where the scheduler may be found to be gone."""
+        """Context in which the scheduler may turn out to be gone."""
         try:
             yield
         except LOST:
-            message = "is gone; what was stored is readable, and --resume goes on with it"
+            message = "is gone; stored shards are readable, and --resume continues the study"
             raise InputError(message, field="scheduler", value=self.address) from None
 
 
 class Board:
-    """What workers tell of how far their shards are, added up."""
+    """The progress reported by workers for their shards, added up."""
 
     def __init__(self, on_progress: Callable[[Progress], None] | None, total: int):
         self.on_progress, self.total = on_progress, total
@@ -188,18 +186,18 @@ class Board:
         self.over: set[int] = set()
 
     def hear(self, event: tuple[float, Sequence[int]]) -> None:
-        """A word of a worker; called from Dask's thread."""
+        """Receive a worker's report; called from Dask's thread."""
         number, ended, reached = event[1]
         if number not in self.over:
             self.tell(number, Tally(ended, reached))
 
     def end(self, number: int, frame: pl.DataFrame) -> None:
-        """A shard has ended."""
+        """Record that a shard has ended."""
         self.over.add(number)
         self.tell(number, Tally(len(frame), int(frame["success"].sum())))
 
     def tell(self, number: int, tally: Tally) -> None:
-        """Pass on where all of them are."""
+        """Pass on the total progress."""
         self.tallies[number] = tally
         whole = sum(list(self.tallies.values()), Tally(0, 0))
         if self.on_progress:
@@ -207,26 +205,26 @@ class Board:
 
 
 def refuse_own(config: StudyConfig) -> None:
-    """Raise `InputError` about what only this process has, and no worker could find."""
+    """Raise `InputError` about components that exist only in this process, where no worker could find them."""
     for name in config.families:
         if name not in KNOWN and not name.endswith(".toml") and not PLACE.fullmatch(name):
-            message = "is registered in this process alone; name it package.module:name for workers to find"
+            message = "is registered in this process only; name it package.module:name so that workers can find it"
             raise InputError(message, field="families", value=name)
 
 
 @contextlib.contextmanager
 def connect(scheduler: str) -> Iterator[Client]:
-    """A client of the scheduler at an address; `InputError` when there is none."""
+    """A client of the scheduler at an address; `InputError` if there is none."""
     knock(scheduler)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", VersionMismatchWarning)  # we say it ourselves
+        warnings.simplefilter("ignore", VersionMismatchWarning)  # we report it ourselves
         client = Client(scheduler, timeout=ANSWER, set_as_default=False)
     with client:
         yield client
 
 
 def knock(scheduler: str) -> None:
-    """Raise `InputError` unless a Dask scheduler answers; `Client` itself would try for long, and say much."""
+    """Raise `InputError` unless a Dask scheduler answers; `Client` itself would retry for long and print much."""
     try:
         parts = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}")
         sound = parts.scheme in ("tcp", "tls") and None not in (parts.hostname, parts.port)
@@ -242,10 +240,10 @@ def knock(scheduler: str) -> None:
     try:
         socket.create_connection(
             (parts.hostname, parts.port), timeout=ANSWER
-        ).close()  # fails at once, Dask tries again
+        ).close()  # fails at once, whereas Dask retries
         kind = asyncio.run(asyncio.wait_for(ask(), ANSWER))
-    except Exception as error:  # what else listens there may say anything
-        problem = reason(error) if isinstance(error, OSError) and error.strerror else "what listens there is none"
+    except Exception as error:  # another program listening there may answer anything
+        problem = reason(error) if isinstance(error, OSError) and error.strerror else "the listening program is not one"
         message = f"no Dask scheduler answers there: {problem}"
         raise InputError(message, field="scheduler", value=scheduler) from None
     if kind != "Scheduler":
@@ -255,13 +253,13 @@ def knock(scheduler: str) -> None:
 
 
 def as_here() -> str:
-    """What a worker runs first, so that it finds the modules of the working directory, as this process does."""
+    """Code that a worker runs first, so that it finds the modules of the working directory, as this process does."""
     return f"import sys; sys.path.append({str(Path.cwd())!r})"
 
 
 @contextlib.contextmanager
 def local_cluster(workers: int) -> Iterator[Client]:
-    """A client of worker processes on this machine, among which its cores are shared out; they end with it."""
+    """A client of worker processes on this machine, which share its cores and end with the client."""
     threads = max(1, cores() // workers)
     with (
         LocalCluster(
@@ -269,7 +267,7 @@ def local_cluster(workers: int) -> Iterator[Client]:
             threads_per_worker=threads,
             processes=True,
             dashboard_address="127.0.0.1:0",
-            memory_limit=0,  # a worker is not killed for what it needs while it compiles
+            memory_limit=0,  # do not kill a worker for its memory while compiling
             silence_logs=logging.CRITICAL,
             env={"PJRT_NPROC": threads},  # XLA's own threads
             preload=[DEAF, as_here()],

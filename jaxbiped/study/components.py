@@ -1,4 +1,4 @@
-"""What people brought to a study: its components that are not built in, and a hash of each."""
+"""The user's own components in a study, and a hash of each."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.study.config import StudyConfig
 
-FAMILY, METRIC, SENSOR, EXECUTOR = "family", "metric", "sensor", "executor"  # before the names of these
+FAMILY, METRIC, SENSOR, EXECUTOR = "family", "metric", "sensor", "executor"  # prefixes of their names
 
 C = TypeVar("C", bound=StudyConfig)
 
 
 def hash_of(strategy: Strategy) -> str:
-    """What a strategy dares, and twelve hex digits of its planner's code and numbers."""
+    """A strategy's abilities, and twelve hex digits of its planner's code and numbers."""
     dares = f"{strategy.bumps:d}{strategy.gates:d}{strategy.blind:d}"
     return f"{dares}-{component_hash(strategy.planner) if strategy.planner is not None else 'none'}"
 
 
 def fingerprinted(config: C) -> C:
-    """The config with `components` filled in, so that its hash covers the code of what people brought.
+    """The config with `components` filled in, so that its hash covers the code of user components.
 
     Raises:
-      InputError: a component that is not known, or whose module or file cannot be used.
+      InputError: an unknown component, or one whose module or file cannot be used.
     """
     own = [find_strategy(name) for name in config.strategies if name not in STRATEGIES]
     made = {item.name: hash_of(item) for item in own}

@@ -1,4 +1,4 @@
-"""What a study is asked for: its arenas, its strategies, and one kind of mission."""
+"""The request for a study: its arenas, its strategies, and one kind of mission."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from jaxbiped.core.registry import STRATEGIES as REGISTERED
 from jaxbiped.core.registry import known_name
 from jaxbiped.mission.config import SIMULATED, MissionConfig
 
-OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # what the names of components' numbers begin with
+OF_COMPONENTS = ("planner.", "sensor.", "executor.")  # prefixes of the names of components' numbers
 
 
 def known_family(name: str) -> str:
-    """A family that is built in or registered, a scene file, or `package.module:name`; nothing is read or imported."""
+    """A built-in or registered family, a scene file, or `package.module:name`; nothing is read or imported."""
     if name.endswith(".toml"):
         return name
     return known_name(name, KNOWN, FAMILIES_OWN, "generator", "a scene file (.toml), ")
@@ -31,7 +31,7 @@ AnyFamily = Annotated[str, pydantic.AfterValidator(known_family)]
 
 
 def known_strategy(name: str) -> str:
-    """A name that is registered, or `package.module:name`, of which nothing is imported here."""
+    """A registered name, or `package.module:name`, from which nothing is imported here."""
     return known_name(name, STRATEGIES, REGISTERED, "planner")
 
 
@@ -39,7 +39,7 @@ StrategyName = Annotated[str, pydantic.AfterValidator(known_strategy)]
 
 
 def known_metric(name: str) -> str:
-    """The same of a metric."""
+    """The same for a metric."""
     return known_name(name, BUILT_IN_METRICS, METRICS_OWN, "metric")
 
 
@@ -50,34 +50,35 @@ class StudyConfig(Model):
     """Strategies compared on the same random arenas."""
 
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Of arenas and noise. Arena k and its noise are functions of this seed and of k alone."""
+    """Seed of arenas and noise. Arena k and its noise are functions of this seed and of k alone."""
     arenas: Annotated[int, pydantic.Field(ge=1, le=100_000_000)] = 600
-    """How many."""
+    """Number of arenas."""
     families: Annotated[tuple[AnyFamily, ...], pydantic.Field(min_length=1)] = FAMILIES
-    """Of arenas: obstacles, bump, stairs, gate, mixed, clutter (these by default), traffic, a scene (.toml), or
-    package.module:name, a generator of your own. They take turns: arena k is of family k modulo their number. A
-    scene file is a family with one arena."""
+    """Families of arenas: obstacles, bump, stairs, gate, mixed, clutter (the default), traffic, a scene (.toml), or
+    package.module:name, a generator of your own. They take turns: arena k is of family k modulo their number. A scene
+    file is a family with one arena."""
     strategies: Annotated[tuple[StrategyName, ...], pydantic.Field(min_length=1)] = STRATEGIES
-    """Those that are compared, by default all below."""
+    """Strategies to compare, by default all below."""
     metrics: tuple[MetricName, ...] = METRICS
-    """Columns beside those that all rows have: path efficiency (spl), the least distance from boxes (clearance), plans
-    but the first (replans), the share of time spent measuring; energy, the work of the servos of simulated bipeds [J];
-    or your own, as package.module:name."""
+    """Additional columns: path efficiency (spl), the smallest distance from boxes (clearance), plans after the first
+    (replans), the share of time spent measuring; energy, the work done by the servos of simulated bipeds [J]; or your
+    own, as package.module:name."""
     numbers: dict[str, float] = pydantic.Field(default_factory=dict)
-    """Of your own components, in place of their defaults: planner.clearance, sensor.reach or executor.slip, say."""
+    """Numbers of your own components, to replace their defaults: planner.clearance, sensor.reach, executor.slip,
+    say."""
     components: Annotated[dict[str, str], tyro.conf.Fixed] = pydantic.Field(default_factory=dict)
-    """A hash of the code and the numbers of each component that is not built in; filled in when the study begins."""
+    """A hash of the code and numbers of each component that is not built in; filled in when the study starts."""
     shard: Annotated[int, pydantic.Field(ge=1, le=65536)] = 1024
-    """Arenas that are computed, and written, together."""
+    """Number of arenas that are computed and written together."""
     population: PopulationConfig = PopulationConfig()
-    """What is the same in all arenas of a family, and not drawn."""
+    """Measures that are the same in all arenas of a family, instead of drawn."""
     mission: Annotated[MissionConfig, tyro.conf.arg(name="")] = MissionConfig()
 
     @pydantic.model_validator(mode="after")
     def _distinct(self):
         for name in ("families", "strategies", "metrics"):
             if len(set(getattr(self, name))) < len(getattr(self, name)):
-                raise ValueError(f"{name} must be named once each")
+                raise ValueError(f"{name} must be distinct")
         for name in self.numbers:
             if not (name.startswith(OF_COMPONENTS) and name.partition(".")[2].isidentifier()):
                 raise ValueError(f"numbers: {name} must be planner.<field>, sensor.<field> or executor.<field>")

@@ -1,4 +1,4 @@
-"""Costs from the execution times of the primitives, as the paper decided on its own (3.1)."""
+"""Costs from the execution times of the primitives, as the paper chose its own (3.1)."""
 
 from __future__ import annotations
 
@@ -17,32 +17,33 @@ from jaxbiped.motion.grid_units import CELL
 from jaxbiped.motion.primitives import Command, Primitive, duration
 
 FLOOR_CELL = 2.0  # what a straight move on the floor costs in the paper: C0 + C1
-KINDS = {  # primitive: which of C1 to C3 its move pays, and how it climbs
+KINDS = {  # primitive: which of C1 to C3 its move costs, and the levels it climbs
     Primitive.STRAIGHT_FORWARD: (1, 0),
     Primitive.PASS_GATE: (2, 0),
     Primitive.STEP_UP_BUMP: (3, 1),
     Primitive.STEP_DOWN_BUMP: (3, -1),
 }
 LENGTHS = (1.0, math.sqrt(2.0))  # straight and diagonal moves, in cells
-ROUNDING = 1e-9  # of the longest move; how a solution of nothing is rounded depends on the processor
+ROUNDING = 1e-9  # relative to the longest move; how a zero solution is rounded depends on the processor
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Costs that durations stand for."""
+    """The costs that durations imply."""
 
     costs: Float[np.ndarray, "4"]  # C0 to C3, scaled so that a straight floor move costs 2, as in the paper
-    seconds: float  # of a unit
+    seconds: float  # duration of one unit
     moves: tuple[str, ...]
-    measured: Float[np.ndarray, "n"]  # [s] of these moves
+    measured: Float[np.ndarray, "n"]  # [s] durations of these moves
     fitted: Float[np.ndarray, "n"]  # [s]
 
 
 def table_2(library: LibraryConfig) -> DurationConfig:
     """Measured primitives in the units of Table 2: 5 cm forward, 45 degrees, one step 5 cm forward, 5 cm of a gate.
 
-    What a measured primitive carries the robot further than that is walked straight, as in `motion.duration`. Without
-    a measured `gate`, the squatting walk stands for it. What a measurement takes is not measured there: the default.
+    Distance that a measured primitive covers beyond that counts as straight walking, as in `motion.duration`. Without
+    a measured `gate`, the squatting walk is used. The duration of a measurement is not known there: the default is
+    used.
     """
     entry = library.primitives
     pace = entry["straight"].duration / (entry["straight"].request[0] / CELL)
@@ -62,15 +63,15 @@ def table_2(library: LibraryConfig) -> DurationConfig:
 
 
 def fit(durations: DurationConfig, *, diagonal: bool = True, measuring: bool = False) -> Fit:
-    """Least squares of what moves take [s] against what they cost (paper, Eq. 1).
+    """Least squares fit of the durations of moves [s] to their costs (paper, Eq. 1).
 
     The moves are those of the grid: on the floor, in a gate, one step up, one step down; each straight and, with
-    `diagonal`, diagonal. Costs are not negative. C4 cannot come from durations: an unmeasured cell takes a further
-    measurement, and whatever turns out to be there.
+    `diagonal`, diagonal. Costs are not negative. C4 cannot be derived from durations: an unmeasured cell takes a
+    further measurement, plus whatever turns out to be there.
 
     Args:
-      diagonal: without, only the sums C0 + C1, C0 + C2 and C0 + C3 are determined; C1 is then C0, as in the paper.
-      measuring: a move takes the measurement that follows it, too.
+      diagonal: if False, only the sums C0 + C1, C0 + C2 and C0 + C3 are determined; C1 is then C0, as in the paper.
+      measuring: a move includes the measurement that follows it.
 
     Raises:
       ValueError: a straight move on the floor takes no time.

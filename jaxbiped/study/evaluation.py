@@ -34,7 +34,7 @@ NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a study is: missions of this run, and all that it has to do."""
+    """How far a study is: missions of this run, and the total to do."""
 
     ended: int
     reached: int
@@ -48,13 +48,13 @@ def evaluate(
     points: Sequence[Point] | None = None,
     done: Collection[int] = (),
 ) -> Iterator[tuple[Shard, pl.DataFrame]]:
-    """Rows of `schema.SCHEMA`, a frame for each shard; memory does not grow with the number of arenas.
+    """Rows of `schema.SCHEMA`, one frame per shard; memory does not grow with the number of arenas.
 
     Consumes `jax.random.key(config.seed)`.
 
     Args:
       points: sweep points; by default the one of `config`.
-      done: numbers of shards to leave out. What others hold does not depend on them.
+      done: numbers of shards to skip. The content of others does not depend on them.
     """
     groups = groups_of(config, points)
     left = [shard for shard in shards(config, len(groups), swept=bool(points)) if shard.number not in done]
@@ -83,9 +83,9 @@ def compute(
     """The rows of one shard: a function of config, group and shard alone, whatever was computed before, and where.
 
     Args:
-      workers: queues worked off at once, a core each; by default as many as this process may use.
+      workers: queues that run at once, one per core; by default as many as this process may use.
     """
-    # Shards are filled up with arenas beyond the study, so that all of them, and those of others, share programs.
+    # Shards are padded with arenas beyond the study, so that all shards, also of other studies, share programs.
     kind, count = group.kind, group.kind.count(shard.first, shard.count)
     index = kind.indices(shard.first, filled(min(config.shard, config.arenas), ARENAS))
     if count == 0:
@@ -96,7 +96,7 @@ def compute(
     check_metrics(batch, group, size)
     with batch_driver(group, workers or cores()) as play:
         result = play(batch, seeds, group.settings, count, group.static, on_progress, population_of=group.population_of)
-    batch = jax.device_get(batch)  # slices of arrays on a device would be compiled, one by one
+    batch = jax.device_get(batch)  # slicing arrays on a device would be compiled, slice by slice
     plan = plan_all(batch, group, size)
     families = [kind.families[turn] for turn in kind.turns(index[:count])]
     rows = frame(index[:count], batch, group, list(map(name_of, families)), result, plan)
@@ -115,8 +115,8 @@ def draw(
     """Arenas `index` of the population, and the seeds of their missions' noise: the same for all strategies.
 
     Args:
-      populations: leaves [U]; the arenas are then those of each of them, one after the other: [U * A].
-      turns: which of the families each is; by default its number modulo theirs.
+      populations: leaves [U]; the result then holds the arenas of each population in turn: [U * A].
+      turns: index of the family of each arena; by default its number modulo their number.
     """
 
     def one(population: Population | None) -> Arena:
@@ -144,7 +144,7 @@ def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
         mine = np.flatnonzero(group.population_of == population)
         arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
         settings = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.settings)
-        several = POINTS if len(mine) == kinds else 1  # of many populations few have as many points
+        several = POINTS if len(mine) == kinds else 1  # few of many populations have as many points
         plan = jax.device_get(make(arenas, fill_up(settings, several)))
         for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(plan), strict=True):
             rows[mine] = found[: len(mine)]

@@ -1,4 +1,4 @@
-"""Everything that `jaxbiped fit-sensor` measures of a rendered stereo camera, and the sensor file that comes of it."""
+"""All measurements that `jaxbiped fit-sensor` makes of a rendered stereo camera, and the resulting sensor file."""
 
 from __future__ import annotations
 
@@ -22,35 +22,35 @@ from jaxbiped.stereo.fit import Quality, Watched, fit_noise, quality, share, tog
 from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
 from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, standing, with_rays
 
-CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # at which the least one that can be matched is looked for
+CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # where the lowest one that can be matched is searched
 CONTRAST_PLACES, CONTRAST_VIEWS = 3, 2
-# Times the camera's across, and thirds of its down: far cells are low in a picture.
+# Multiples of the camera's columns, and thirds of its rows: far cells are low in a picture.
 MORE_RAYS = (1, 3), (1, 4), (2, 6), (2, 8), (4, 12)
-# Share of the cells that is to be that of rendered pairs; these come to 0.99 of themselves with other noise. Maps that
-# have 0.92 in common still part at edges that few rays meet, and missions with them (`sweeps/benchmarks/stereo.py`).
+# Required share of cells that equal those of rendered pairs, which repeat 0.99 of them with other noise. Maps that
+# share 0.92 still differ at edges that few rays hit, and so do their missions (`sweeps/benchmarks/stereo.py`).
 ALIKE = 0.975
 NEVER_FURTHER = LandmarkConfig(sd=0, sd_per_metre=0, nearest=0, furthest_circle=100, furthest_square=100)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A sensor file, and what it was fitted to."""
+    """A sensor file, and the measurements it was fitted to."""
 
     sensor: SensorConfig
     quality: Quality  # of the matcher, on textured surfaces
-    plain: float  # share of surfaces without texture, rims left out, that comes out as something
+    plain: float  # share of untextured surfaces, without their rims, that is matched
     sights: tuple[Sight, ...]  # landmarks
     views: int
-    same: float  # share of the fused cells that the ray-cast sensor, fitted, has as rendered pairs have them
+    same: float  # share of the fused cells on which the fitted ray-cast sensor agrees with rendered pairs
 
 
 def fit(
     places: Sequence[Place], eyes: StereoEyes, config: MissionConfig, tell: Callable[[], None] = lambda: None
 ) -> Fit:
-    """Watch the matcher and the landmarks in all places, and fit the models of both.
+    """Evaluate the matcher and the landmark detector in all places, and fit the models of both.
 
     Args:
-      config: of the missions; its own noise is the base, for what cannot be measured in pictures.
+      config: config of the missions; its own noise is the base, for what cannot be measured in pictures.
       tell: called after each view.
     """
     settings = config.settings("full")
@@ -83,10 +83,10 @@ def choices(camera: CameraConfig) -> list[RayConfig]:
 
 
 def fewest_rays(places: Sequence[Place], eyes: StereoEyes, config: MissionConfig) -> tuple[RayConfig, float]:
-    """The fewest rays with which `ALIKE` of the cells are those of rendered pairs (else the most), and their share.
+    """The fewest rays with which `ALIKE` of the cells agree with rendered pairs (else the most), and their share.
 
     Args:
-      config: of the missions that see rendered pairs, with the fitted noise.
+      config: config of the missions that see rendered pairs, with the fitted noise.
     """
     stereo = np.stack([fused(place, looking(config, eyes), config)[0] for place in places])
     for rays in choices(config.camera):
@@ -100,7 +100,7 @@ def fewest_rays(places: Sequence[Place], eyes: StereoEyes, config: MissionConfig
 def eye(
     place: Place, number: int, settings: MissionParams, config: MissionConfig
 ) -> tuple[np.ndarray, np.ndarray, Mount, int]:
-    """Where the camera really is in view `number` of a place, where it is believed to sit, and the view's seed."""
+    """The true and the believed camera pose in view `number` of a place, and the view's seed."""
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
     seed = jnp.asarray(place.seed, jnp.uint32)[None]
     world, mind = standing(*batch, seed, place.poses[number], jnp.int32(number), program(config, AREA))
@@ -109,7 +109,7 @@ def eye(
 
 
 def watch_from(place: Place, number: int, eyes: StereoEyes, settings: MissionParams, config: MissionConfig) -> Watched:
-    """The matcher in one view."""
+    """Evaluate the matcher in one view."""
     origin, basis, _, seed = eye(place, number, settings, config)
     eyes.sensor.show(place.arena)
     return watch(eyes.sensor, origin, basis, int(seed))
@@ -118,7 +118,7 @@ def watch_from(place: Place, number: int, eyes: StereoEyes, settings: MissionPar
 def landmarks_of(
     place: Place, number: int, eyes: StereoEyes, settings: MissionParams, config: MissionConfig
 ) -> list[Sight]:
-    """Landmarks that lie in view of both cameras, found or not."""
+    """Landmarks in view of both cameras, found or not."""
     pose = place.poses[number]
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
     seed = jnp.asarray(place.seed, jnp.uint32)[None]
@@ -134,7 +134,7 @@ def landmarks_of(
 
 
 def in_view(arena: Arena, pose: Pose, settings: MissionParams, config: MissionConfig):
-    """Landmarks whose centres both cameras see, at whatever range."""
+    """Landmarks whose centres both cameras see, at any range."""
     return jax.device_get(
         sight_all(arena, pose, settings.camera, NEVER_FURTHER.traced(), config.camera.image, jnp.uint32(0))
     )
@@ -166,12 +166,12 @@ def least_contrast(
 
 
 def unmarked(arena: Arena) -> Arena:
-    """An arena without landmarks, which are plain."""
+    """An arena without landmarks, which are untextured."""
     return replace(arena, landmarks=replace(arena.landmarks, used=np.zeros_like(arena.landmarks.used)))
 
 
 def sensor_toml(fit: Fit, heading: Sequence[str]) -> str:
-    """A sensor file, with what each number means."""
+    """A sensor file, with the meaning of each number."""
     lines = [f"# {line}" for line in heading]
     for name in ("stereo", "landmarks", "rays"):
         part, docs = getattr(fit.sensor, name), field_docs(type(getattr(fit.sensor, name)))

@@ -35,14 +35,14 @@ def run_on_host(
     population_of: Int[np.ndarray, "P"],
     workers: int = 2,
 ) -> Result:
-    """As `queues.run_all`, for a sensor that measures on the host: each worker is a thread with eyes of its own.
+    """As `queues.run_all`, for a sensor that measures on the host: each worker is a thread with its own eyes.
 
-    OpenGL and OpenCV work while the other thread has the interpreter. Which of them plays a mission does not change its
+    OpenGL and OpenCV run while the other thread has the interpreter. Which worker plays a mission does not change its
     result.
 
     Args:
-      open_eyes: makes eyes, in the thread that uses them, and closes them there.
-      workers: one for each core that there is; OpenGL and OpenCV have threads of their own beside.
+      open_eyes: creates eyes in the thread that uses them, and closes them there.
+      workers: by default one for each core; OpenGL and OpenCV have additional threads.
     """
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
     first = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (batch, points))
@@ -77,7 +77,7 @@ def run_on_host(
         try:
             play(number)
         except BaseException:
-            stop.set()  # neither an interrupt nor an error shall wait for all the missions that are left
+            stop.set()  # on an interrupt or an error, do not wait for all remaining missions
             raise
 
     with ThreadPoolExecutor(workers) as pool:

@@ -14,9 +14,9 @@ LOCK = ".lock"
 
 
 class FolderLock:
-    """An advisory lock (flock) on `.lock` in a folder. The system lets go of it when its process dies, however it dies.
+    """An advisory lock (flock) on `.lock` in a folder. The system releases it when its process dies, however it dies.
 
-    Raises `InputError` that names the holder when another process, or this one, holds it already.
+    Raises `InputError` that names the holder if another process, or this one, already holds it.
     """
 
     def __init__(self, folder: str | Path):
@@ -42,17 +42,17 @@ class FolderLock:
             except OSError as error:
                 os.close(self.descriptor)
                 raise InputError(f"cannot be written: {reason(error)}", file=self.path) from None
-            os.close(self.descriptor)  # its last holder removed this file between our open and our lock: try anew
+            os.close(self.descriptor)  # its last holder removed this file between our open and our lock: retry
 
     def is_current(self) -> bool:
-        """Whether the locked file is still the one that the folder shows."""
+        """Whether the locked file is still the one in the folder."""
         try:
             return os.path.samestat(os.fstat(self.descriptor), os.stat(self.path))
         except FileNotFoundError:
             return False
 
     def release(self) -> None:
-        """Remove the file, then let go; doing it again does nothing."""
+        """Remove the file, then release the lock; doing it again has no effect."""
         if self.descriptor >= 0:
             self.path.unlink(missing_ok=True)
             os.close(self.descriptor)

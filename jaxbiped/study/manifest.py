@@ -1,4 +1,4 @@
-"""The manifest of a results folder: what its rows are, and how they came to be."""
+"""The manifest of a results folder: what its rows are, and how they were made."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ UNREADABLE = (pl.exceptions.PolarsError, OSError, pydantic.ValidationError, Valu
 
 
 class Manifest(Model):
-    """What a results folder holds and how it came to be."""
+    """What a results folder holds and how it was made."""
 
     format: int = FORMAT
     state: Literal["running", "stopped", "finished"]
@@ -36,21 +36,21 @@ class Manifest(Model):
     device: str
     seed: int
     arenas: int
-    """Arenas that the study is to have for each sweep point."""
+    """Number of arenas that the study will have for each sweep point."""
     started: str
     """ISO 8601, UTC."""
     wall_time: float | None = None
-    """Seconds from start to finish, compilation included; while it is not finished, up to its last shard. The sum over
-    all runs of a study that was resumed, without what was lost when one was stopped."""
+    """Seconds from start to finish, including compilation; while unfinished, up to the last shard. For a resumed study
+    the sum over all runs, without the work that was lost when one stopped."""
     compile_time: float | None = None
-    """Seconds of compilation, of the same runs."""
+    """Seconds of compilation in the same runs."""
     resumed: int = 0
     """How often the study was resumed."""
     shards: int | None = None
     rows: int | None = None
     """Rows in all shards, once finished."""
     metrics: dict[str, MetricFormat] = pydantic.Field(default_factory=dict)
-    """How the numbers in the columns of metrics are shown."""
+    """How the numbers in the columns of metrics are displayed."""
 
 
 def versions() -> dict[str, str]:
@@ -66,7 +66,7 @@ def device() -> str:
 
 
 def read_manifest(folder: str | Path) -> Manifest:
-    """The manifest of a results folder; `InputError` when there is none, or none that this version reads."""
+    """The manifest of a results folder; `InputError` if there is none, or none that this version can read."""
     path = Path(folder) / MANIFEST
     if not Path(folder).is_dir():
         raise InputError("no such results folder", file=folder)

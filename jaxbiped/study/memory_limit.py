@@ -1,4 +1,4 @@
-"""What a study needs in memory at once, so that one that does not fit is refused before it is compiled."""
+"""The memory that a study needs, so that one that does not fit is rejected before it is compiled."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from jaxbiped.mission.settings import MissionSpec
 # Bytes, measured as growth of the resident memory, and rounded up.
 POINT = 25_000  # a sweep point: its config
 SETTING = 35_000  # and its numbers, for each strategy
-ROW = 2_000  # a mission of a shard: its job, its result on both sides, its row
-MAPS = 4  # copies of a slot's map: the queue's, and what an update makes of it
-SHARE = 0.8  # of the memory that there is
+ROW = 2_000  # a mission of a shard: its job, its result on device and host, its row
+MAPS = 4  # copies of a slot's map: the queue's, and those made by an update
+SHARE = 0.8  # of the available memory
 
 
 def memory() -> int:
-    """Bytes that this process can have: of the machine, or of its control group."""
+    """Bytes available to this process: of the machine, or of its control group."""
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     with contextlib.suppress(OSError, ValueError):
         total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
@@ -28,7 +28,7 @@ def memory() -> int:
 
 
 def most_points(strategies: int) -> int:
-    """How many sweep points fit, on one arena at a time."""
+    """How many sweep points fit, with one arena at a time."""
     return memory() // (POINT + strategies * (SETTING + ROW))
 
 
@@ -40,11 +40,11 @@ def map_bytes(static: MissionSpec, workers: int) -> int:
 
 
 def check_memory(static: MissionSpec, points: int, strategies: int, arenas: int, workers: int) -> None:
-    """Raise `InputError` when a shard of `arenas` under `points` does not fit, with what would.
+    """Raise `InputError` if a shard of `arenas` under `points` does not fit, saying what would.
 
     Args:
-      points: of one group, all in one call; memory is taken for as many as their program is compiled for.
-      workers: queues at once, each with maps of its own.
+      points: of one group, all in one call; memory is counted for as many as their program is compiled for.
+      workers: queues at once, each with its own maps.
     """
     kinds, maps = points * strategies, map_bytes(static, workers)
     left = memory() - maps - points * POINT - filled(kinds, POINTS) * SETTING
@@ -52,7 +52,7 @@ def check_memory(static: MissionSpec, points: int, strategies: int, arenas: int,
     if fit < 1:
         size = f"{points} points x {strategies} strategies with maps of {static.spec.shape} cells"
         least = memory() - left + workers * filled(-(-kinds // workers), JOBS) * ROW
-        message = f"{size} need {least / 2**30:.1f} GiB, of {memory() / 2**30:.1f} that may be used"
+        message = f"{size} need {least / 2**30:.1f} GiB, of {memory() / 2**30:.1f} available"
         raise InputError(f"{message}; sweep fewer points at once, or on a coarser pitch", field="axes")
     if arenas > fit:
         message = f"{points} points x {strategies} strategies: at most {fit} arenas a shard fit in memory"

@@ -1,4 +1,4 @@
-"""The columns of a study's metrics, from what its missions remembered at their ends."""
+"""The columns of a study's metrics, from the values that its missions kept to their ends."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from jaxbiped.study.batching import Group
 def metric_columns(batch: Arena, group: Group, result: Result, plan: OraclePlan, size: int) -> dict[str, pl.Series]:
     """A column for each metric of a group, null where a mission has no such number; rows as those of `result`.
 
-    A number that is NaN or infinite counts as none, with a warning that names the metric.
+    A number that is NaN or infinite counts as missing, with a warning that names the metric.
 
     Args:
       batch: arenas [U * size] of the `U` populations, on the host.
@@ -33,7 +33,7 @@ def metric_columns(batch: Arena, group: Group, result: Result, plan: OraclePlan,
     if not group.metrics:
         return {}
     count = result.code.shape[1]
-    # Filled up, so that all shards of a study share one program.
+    # Padded, so that all shards of a study share one program.
     full = jax.tree.map(lambda leaf: np.pad(leaf, [(0, 0), (0, size - count)] + [(0, 0)] * (leaf.ndim - 2)), result)
     found: list = [None] * len(group.population_of)
     for population in np.unique(group.population_of):
@@ -51,7 +51,7 @@ def metric_columns(batch: Arena, group: Group, result: Result, plan: OraclePlan,
         value, valid = (np.concatenate([rows[index][part] for rows in found]) for part in (0, 1))
         finite = np.isfinite(value)
         if (wrong := int(np.sum(valid & ~finite))) > 0:
-            warnings.warn(f"metric {name}: not finite in {wrong} of {len(value)} missions, which count as without it",
+            warnings.warn(f"metric {name}: not finite in {wrong} of {len(value)} missions, which count as missing",
                           RuntimeWarning, stacklevel=2)  # fmt: skip
         columns[name] = pl.Series(name, np.where(finite, value, 0.0).astype(float)).to_frame().select(
             pl.when(pl.Series(valid & finite)).then(pl.col(name)).alias(name)
@@ -61,10 +61,10 @@ def metric_columns(batch: Arena, group: Group, result: Result, plan: OraclePlan,
 
 @with_own_settings
 def check_metrics(batch: Arena, group: Group, size: int) -> None:
-    """Look at what metrics give, before a mission is played for them; arguments as of `metric_columns`.
+    """Check what metrics return before a mission is played for them; arguments as for `metric_columns`.
 
     Raises:
-      InputError: a metric whose result is not one number and one truth value.
+      InputError: a metric whose result is not one number and one boolean.
     """
     if not group.metrics:
         return
@@ -80,7 +80,7 @@ def check_metrics(batch: Arena, group: Group, size: int) -> None:
     CHECKED.add(kind)
 
 
-CHECKED: set = set()  # structures and shapes that have been looked at
+CHECKED: set = set()  # structures and shapes that have been checked
 
 
 @ready_jit

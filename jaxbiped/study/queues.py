@@ -1,4 +1,4 @@
-"""Missions dealt to compiled queues: one for each core, or for each device."""
+"""Missions dealt to compiled queues, one for each core or each device."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def run_all(
 ) -> Result:
     """The first `count` arenas under every point: results [P, count], on the host.
 
-    Jobs are dealt to as many queues as there are devices, or to as many as there are workers where there is one device.
-    Which queue a job is in does not change its result.
+    Jobs are dealt to as many queues as there are devices or, with one device, to as many as there are workers. The
+    queue that a job is in does not change its result.
 
     Args:
       batch: [A], or [U * A] where there are `U` populations.
-      workers: at most so many queues, by default as many as this process may use cores; fewer where each would have
-        more slots than jobs.
-      slots: of each queue. XLA fuses a program by its sizes, and what it fuses otherwise may round otherwise: rows are
-        the same, bit for bit, among runs of as many slots, so that few jobs have as many as many do.
-      population_of: which of these each point is about; by default the first.
+      workers: the most queues, by default as many as cores that this process may use; fewer if each would have more
+        slots than jobs.
+      slots: slots of each queue. XLA fuses a program depending on its sizes, and fusion affects rounding: rows are the
+        same, bit for bit, only among runs with as many slots, so few jobs get as many slots as many jobs.
+      population_of: the population of each point; by default the first.
       devices: by default all of this process.
     """
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
@@ -82,7 +82,7 @@ def run_all(
 def run_threads(
     work: Work, batch: Arena, points: MissionParams, hands: Sequence[Jobs], on_progress: OnProgress
 ) -> list[Result]:
-    """Work off queues at once, a thread each."""
+    """Run queues at once, one thread each."""
     tallies, lock = [Tally(0, 0)] * len(hands), threading.Lock()
     stop = threading.Event()
 
@@ -100,5 +100,5 @@ def run_threads(
         try:
             return list(pool.map(play, range(len(hands))))
         except BaseException:
-            stop.set()  # an interrupt shall not wait for the whole shard
+            stop.set()  # on an interrupt, do not wait for the whole shard
             raise

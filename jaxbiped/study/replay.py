@@ -1,4 +1,4 @@
-"""A few missions of a stored study played again, one by one, to be looked at."""
+"""Replay a few missions of a stored study, one by one, for inspection."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ class Example:
 
 
 def examples(frame: pl.DataFrame, first: str, second: str, count: int) -> tuple[Example, ...]:
-    """Up to `count` arenas where two sides differ most, the kinds of difference taking turns.
+    """Up to `count` arenas where two sides differ most, with the kinds of difference taking turns.
 
-    Kinds: the greatest difference in time where both arrived, whichever was faster; only the first arrived, and only
-    the second. In the last two, the arena where the other walked furthest in vain.
+    Kinds: the greatest difference in time where both arrived, whichever was faster; only the first arrived; only the
+    second arrived. In the last two, the arena where the other walked farthest in vain.
 
     Args:
-      frame: rows of two names in `strategy`.
+      frame: rows with two names in `strategy`.
     """
     sides = [frame.filter(pl.col("strategy") == name) for name in (first, second)]
     both, solved = paired(*sides)
@@ -86,7 +86,7 @@ class Origin(NamedTuple):
 
     manifest: Manifest
     point: int
-    values: dict[str, float]  # of the swept fields at that point, by their dotted names
+    values: dict[str, float]  # values of the swept fields at that point, by dotted name
     strategy: str
 
 
@@ -98,17 +98,17 @@ def play_again(
     arenas: Sequence[int],
     own: Mapping[str, Strategy] | None = None,
 ) -> list[Mission]:
-    """Missions of some arenas, as the study played them, with their logs. Other arguments: see `Origin`.
+    """Replay missions of some arenas as the study played them, with their logs. Other arguments: see `Origin`.
 
     Args:
-      own: strategies by their names that are not built in. A results folder never causes an import.
+      own: strategies that are not built in, by name. A results folder never causes an import.
 
     Raises:
       InputError: a config that this version does not know, a biped that cannot be simulated here, or a strategy that
-        is not built in and not given, or is not the one of the study.
+        is neither built in nor given, or differs from that of the study.
     """
     again = strategy_again(manifest, strategy, own or {})
-    said = manifest.config.get("mission")  # looked at as it is: reading it as a config would import what it names
+    said = manifest.config.get("mission")  # used in its raw form: parsing it as a config would import what it names
     for kind, default, known in ((SENSOR, "raycast", SENSORS), (EXECUTOR, "kinematic", EXECUTORS)):
         same_component(manifest, kind, str(said.get(kind, default)) if isinstance(said, dict) else default, known)
     config, families, population = mission_of(manifest, point, values)
@@ -129,39 +129,39 @@ def play_again(
 
 
 def strategy_again(manifest: Manifest, name: str, own: Mapping[str, Strategy]) -> Strategy:
-    """A strategy of a study: one that is built in, or that is given again and has the hash that the study tells."""
+    """A strategy of a study: a built-in one, or one that is given and has the hash stored by the study."""
     if name in BUILT_IN:
         return find_strategy(name)
     if name not in own:
-        message = "is not built in: its missions can be played again only by a program that gives it again"
+        message = "is not built in: its missions can be replayed only by a program that supplies it"
         raise InputError(message, field="strategy", value=name)
     if hash_of(own[name]) != manifest.config.get("components", {}).get(name):
-        raise InputError("has other code or other numbers than in the study", field="strategy", value=name)
+        raise InputError("has different code or numbers than in the study", field="strategy", value=name)
     return own[name]
 
 
 def same_component(manifest: Manifest, kind: str, name: str, built_in: Sequence[str]) -> None:
-    """Raise `InputError` unless a sensor or an executor is built in, or registered and as the study tells."""
+    """Raise `InputError` unless a sensor or an executor is built in, or registered with the study's hash."""
     if name in built_in:
         return
     registry = SENSORS_OWN if kind == SENSOR else EXECUTORS_OWN
     if name not in registry:
-        raise InputError("is not built in: only a program that registers it can play it again", field=kind, value=name)
+        raise InputError("is not built in: only a program that registers it can replay it", field=kind, value=name)
     if component_hash(registry.held[name]) != manifest.config.get("components", {}).get(f"{kind} {name}"):
-        raise InputError("has other code or other numbers than in the study", field=kind, value=name)
+        raise InputError("has different code or numbers than in the study", field=kind, value=name)
 
 
 def families_again(manifest: Manifest, names: Sequence[str]) -> tuple[str | OwnFamily, ...]:
-    """The families of a study: those that are built in, and scenes and registered ones that have the hash it tells."""
+    """The families of a study: built-in ones, and scenes and registered ones that have the stored hash."""
     found = []
     for name in names:
         if name not in KNOWN and not name.endswith(".toml") and name not in FAMILIES:
-            message = "is not built in: its arenas can be drawn again only by a program that registers it"
+            message = "is not built in: its arenas can be redrawn only by a program that registers it"
             raise InputError(message, field="families", value=name)
         found.append(find_family(name))
         hashes = manifest.config.get("components", {})
         if not isinstance(found[-1], str) and found[-1].digest() != hashes.get(f"{FAMILY} {found[-1].name}"):
-            raise InputError("is not what it was in the study", field="families", value=name)
+            raise InputError("has changed since the study", field="families", value=name)
     return tuple(found)
 
 

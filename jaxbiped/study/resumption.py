@@ -1,4 +1,4 @@
-"""Going on with a study that was stopped: its folder is taken up only where the result will be as if it never was."""
+"""Resume a stopped study: its folder is continued only if the result will be as if it had never stopped."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read
 from jaxbiped.study.shard_files import ROWS, broken_shard, shard_number, shard_paths
 from jaxbiped.study.store import POINTS, Store, create
 
-SHOWN = 6  # differing fields in a message
+SHOWN = 6  # most differing fields in a message
 ABSENT = "nothing"
 
 
@@ -33,15 +33,15 @@ def resume(
     device_name: str = "",
     metrics: Mapping[str, MetricFormat] | None = None,
 ) -> Store:
-    """A results folder open for writing what is left; where nothing was begun there, a new one.
+    """A results folder open for writing the rest of a study; a new one if nothing was started there.
 
     Args:
-      rows: how many rows each shard has, by its number.
+      rows: number of rows of each shard, by its number.
       points, metrics: as for `create`.
-      device_name: of where it will be computed; by default the devices that JAX sees here.
+      device_name: where it will be computed; by default the devices that JAX sees here.
 
     Raises:
-      InputError: the folder is finished, is being written, holds something else or a damaged shard, or was begun
+      InputError: the folder is finished, is being written, holds something else or a damaged shard, or was started
         with another config, other versions or on another kind of device; nothing is changed then.
     """
     folder = Path(folder)
@@ -54,7 +54,7 @@ def resume(
     refuse_other_program(folder, manifest, device_name or device())
     lock = FolderLock(folder)
     try:
-        manifest = read_manifest(folder)  # another process may have resumed it before we had the lock
+        manifest = read_manifest(folder)  # another process may have resumed it before we got the lock
         refuse_finished(folder, manifest)
         check_shards(folder, rows)
         sweep_up(folder)
@@ -67,9 +67,9 @@ def resume(
 
 
 def refuse_taken(folder: Path) -> None:
-    """Raise `InputError` when a new study cannot be written there, with what to do about one that was stopped."""
+    """Raise `InputError` if a new study cannot be written there, with advice for one that was stopped."""
     if (folder / MANIFEST).exists() and read_manifest(folder).state != "finished":
-        message = "holds a study that is not finished: --resume goes on with it"
+        message = "holds an unfinished study: --resume continues it"
         raise InputError(message, field="out", value=str(folder))
     files.refuse_existing(folder)
 
@@ -95,18 +95,18 @@ def begun(folder: Path) -> bool:
 
 
 def is_scrap(path: Path) -> bool:
-    """A file that was being written when its writer was killed (`files.write_whole`)."""
+    """Whether a file was being written when its writer was killed (`files.write_whole`)."""
     return path.name.startswith(".") and path.name.endswith(".part")
 
 
 def sweep_up(folder: Path) -> None:
-    """Remove what a killed writer was writing."""
+    """Remove files that a killed writer was writing."""
     for place in (folder, folder / ROWS):
         files.sweep_up(place)
 
 
 def refuse_finished(folder: Path, manifest: Manifest) -> None:
-    """Raise `InputError` when there is nothing to go on with."""
+    """Raise `InputError` if there is nothing to resume."""
     if manifest.state == "finished":
         message = f"this study is finished: nothing to resume; `jaxbiped report {folder}` shows it"
         raise InputError(message, file=folder)
@@ -123,12 +123,12 @@ def refuse_other_config(folder: Path, manifest: Manifest, config: Model) -> None
     if changes:
         more = f", and {len(changes) - SHOWN} more" if len(changes) > SHOWN else ""
         which = f"{', '.join(changes[:SHOWN])}{more}"
-        message = f"was started with another config, and can only be resumed with that one: {which}"
+        message = f"was started with another config, and can only be resumed with the same: {which}"
         raise InputError(message, file=folder)
 
 
 def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted names and values of everything in a config that holds no further table; a list of tables is one."""
+    """Dotted names and values of all leaves of a config; a list of tables is one leaf."""
     if isinstance(tree, Mapping) and tree:
         items = tree.items()
     elif isinstance(tree, list) and any(isinstance(item, Mapping) for item in tree):
@@ -141,7 +141,7 @@ def leaves(tree: Any, name: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def refuse_other_program(folder: Path, manifest: Manifest, device_name: str) -> None:
-    """Raise `InputError` where rows that were computed now might differ from those that are there."""
+    """Raise `InputError` if rows computed now might differ from those stored."""
     here = versions()
     there = {"device": manifest.device.partition(" x ")[2], **manifest.versions}
     here = {"device": device_name.partition(" x ")[2], **here}
@@ -154,16 +154,16 @@ def refuse_other_program(folder: Path, manifest: Manifest, device_name: str) -> 
 
 
 def check_shards(folder: Path, rows: Sequence[int]) -> None:
-    """Raise `InputError` about the first shard that is not what this study writes."""
+    """Raise `InputError` about the first shard that this study would not write."""
     for path in shard_paths(folder):
         number = shard_number(path)
         if number >= len(rows):
-            raise InputError(f"is no shard of this study, which has {len(rows)}", file=path)
+            raise InputError(f"is not a shard of this study, which has {len(rows)}", file=path)
         try:
             frame = validate(pl.read_parquet(path), file=path)
         except UNREADABLE as error:
             problem = error if isinstance(error, InputError) else broken_shard(path, error)
-            raise InputError(f"{problem}; remove this file, and it is computed again") from None
+            raise InputError(f"{problem}; remove this file to have it computed again") from None
         if len(frame) != rows[number]:
-            message = f"has {len(frame)} rows, where this study has {rows[number]}; remove it, and it is computed again"
+            message = f"has {len(frame)} rows, where this study has {rows[number]}; remove it to have it computed again"
             raise InputError(message, file=path)

@@ -1,4 +1,4 @@
-"""Rows of missions: what became of them, and what could have with perfect knowledge."""
+"""Rows of missions: how they ended, and how they could have ended with perfect knowledge."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def frame(
     result: Result,
     plan: OraclePlan,
 ) -> pl.DataFrame:
-    """Rows of all points and strategies on arenas `index`, the first of the batch, which is on the host.
+    """Rows of all points and strategies on arenas `index`, the first ones of the batch, which is on the host.
 
     Args:
-      families: the name of each arena's.
+      families: the family name of each arena.
     """
     count, kinds, strategies = len(index), len(group.population_of), group.strategies
     family, difficulty = np.array(families, str), batch.difficulty[:count]

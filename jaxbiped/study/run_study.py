@@ -1,4 +1,4 @@
-"""Runs a study from its config into a results folder, from the start or from where it was stopped."""
+"""Run a study from its config into a results folder, from the start or from where it was stopped."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluation import Progress, evaluate
 from jaxbiped.study.resumption import resume as take_up
 
-# Where shards are computed: called as `evaluate.evaluate`, the one of this process. The order of shards is its own.
+# Where shards are computed: called like `evaluate.evaluate`, that of this process. It chooses the order of shards.
 Engine = Callable[..., Iterator[tuple[Shard, pl.DataFrame]]]
 
 
 def never(frame: pl.DataFrame) -> bool:
-    """All arenas are wanted."""
+    """The rule that wants all arenas."""
     return False
 
 
@@ -37,23 +37,23 @@ def conduct(
     compile_time: Callable[[], float] | None = None,
     enough: Callable[[pl.DataFrame], bool] = never,
 ) -> store.Manifest:
-    """Compute a study and store it, shard by shard. A process that dies loses at most the shard that it was at.
+    """Compute a study and store it, shard by shard. A process that dies loses at most the current shard.
 
     Args:
       folder: must not exist or be empty; with `resume`, one where the same study was stopped, or none yet.
       points: sweep points; by default the one of `config`.
-      device: of the engine, in words; by default that of this process.
-      compile_time: [s] that the engine has spent compiling so far; by default what this process has.
-      enough: is given each shard once, in the order of their numbers, and says whether the study can end there.
+      device: the engine's device, in words; by default that of this process.
+      compile_time: [s] that the engine has spent compiling so far; by default the time of this process.
+      enough: called with each shard once, in order of their numbers; returns whether the study can end there.
 
     Raises:
-      InputError: a folder that is not so, or a full disk; what was stored stays readable.
+      InputError: an unsuitable folder, or a full disk; stored shards stay readable.
     """
     clock, config = CompileClock(), fingerprinted(config)
     compile_time = compile_time or (lambda: clock.seconds)
     swept = points is not None
     points = tuple(points) if swept else only_point(config)
-    groups = groups_of(config, points)  # refuses what does not go together before anything is written
+    groups = groups_of(config, points)  # rejects invalid combinations before anything is written
     kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
     kind["device_name"] = device
     kind["metrics"] = {name: format_of(metric, name) for name, metric in metrics_of(config).items()}
@@ -73,12 +73,12 @@ def conduct(
 
 
 def in_order(enough: Callable[[pl.DataFrame], bool], parts: int = 1) -> Callable[[int, pl.DataFrame], bool]:
-    """`enough` for shards that come in any order, with their numbers: the others wait for the one whose turn it is.
+    """`enough` for shards that arrive in any order, with their numbers: they wait for those with lower numbers.
 
-    Which shard ends first depends on what is in it, so that a rule which looked at them as they come would be biased.
+    Which shard ends first depends on its content, so a rule that saw them as they arrive would be biased.
 
     Args:
-      parts: shards that a block of arenas consists of, which are looked at together.
+      parts: shards per block of arenas, which are looked at together.
     """
     waiting: dict[int, pl.DataFrame] = {}
     turn = 0
@@ -99,13 +99,13 @@ def in_order(enough: Callable[[pl.DataFrame], bool], parts: int = 1) -> Callable
 
 
 def shard_rows(config: StudyConfig, points: Sequence[Point], *, swept: bool = False) -> list[int]:
-    """Rows of each shard, by its number."""
+    """Number of rows of each shard, by its number."""
     groups = groups_of(config, points)
     return [groups[shard.group].rows(shard) for shard in shards(config, len(groups), swept=swept)]
 
 
 def table(points: Sequence[Point]) -> pl.DataFrame:
-    """Sweep points as they are stored (`store.read_points`)."""
+    """Sweep points in their stored form (`store.read_points`)."""
     names = list(points[0].values)
     columns = {name: [float(point.values[name]) for point in points] for name in names}
     return pl.DataFrame(

@@ -1,4 +1,4 @@
-"""The one place that chooses what drives missions: their driver, their sensor and their executor."""
+"""The one place that chooses what runs missions: their driver, their sensor and their executor."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from jaxbiped.study.batching import Group, numbers_under
 
 
 def noise_of(seed: int) -> UInt32[Array, ""]:
-    """The seed of all noise of one mission, from that which a user gives."""
+    """The seed of all noise of one mission, from the user's seed."""
     return noise_of_word(np.uint32(seed & 0xFFFFFFFF))
 
 
 @ready_jit
 def noise_of_word(seed: UInt32[Array, ""]) -> UInt32[Array, ""]:
-    """One program, where JAX by itself loads six small ones."""
+    """One compiled program, where JAX itself would load six small ones."""
     return from_key(jax.random.key(seed))
 
 
@@ -41,10 +41,10 @@ def program_of(config: MissionConfig, arena: Arena) -> MissionSpec:
 
 
 def check_mission(config: MissionConfig) -> None:
-    """Refuse, before anything is printed or written, what cannot be run on this machine.
+    """Reject, before anything is printed or written, missions that cannot run on this machine.
 
     Raises:
-      InputError: a biped that cannot play its primitives, a device or a renderer that is not there.
+      InputError: a biped that cannot play its primitives, a missing device or renderer.
     """
     if config.executor in SIMULATED:
         from jaxbiped.mission.simulated_driver import rehearse  # loads MuJoCo
@@ -54,7 +54,7 @@ def check_mission(config: MissionConfig) -> None:
 
 @contextlib.contextmanager
 def seeing(config: MissionConfig) -> Iterator[Eyes | None]:
-    """What missions of a config see with on the host, closed when it is left; None where their sensor is JAX."""
+    """What missions of a config see with on the host, closed on exit; None if their sensor is in JAX."""
     eyes = eyes_for(config)
     try:
         yield eyes
@@ -72,12 +72,12 @@ def play_one(
     eyes: Eyes | None = None,
     numbers: Mapping[str, float] | None = None,
 ) -> Mission:
-    """One mission, with a log of everything, as a study would play it.
+    """Play one mission as a study would, with a log of everything.
 
     Args:
       noise: seed of all its noise.
-      eyes: of `seeing`, where the sensor measures on the host.
-      numbers: of components, in place of their own, as `{"planner.clearance": 0.1}`.
+      eyes: from `seeing`, if the sensor measures on the host.
+      numbers: numbers of components, instead of their defaults, such as `{"planner.clearance": 0.1}`.
 
     Raises:
       InputError: a pitch that does not divide the arena, a biped that cannot be simulated.
@@ -92,7 +92,7 @@ def play_one(
 
 
 def numbered(settings: MissionParams, strategy: str | Strategy, numbers: Mapping[str, float]) -> MissionParams:
-    """Settings of a strategy with other numbers of its components."""
+    """Settings of a strategy with other numbers for its components."""
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
     changed = {"sensor": settings.sensor, "executor": settings.executor, "planner": strategy.planner}
     for name, component in changed.items():

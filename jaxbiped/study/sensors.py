@@ -1,4 +1,4 @@
-"""Two sensors in the same places: how close their maps, and their missions, come to each other and to the truth."""
+"""Two sensors in the same places: how close their maps and missions are to each other and to the truth."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ from jaxbiped.sensing.view import View
 from jaxbiped.study.evaluation import draw
 
 AREA = (SIZE_X, SIZE_Y)
-AWAY = (0.25, 0.80)  # [m] before what a view is aimed at
-LOW = 0.07  # [m] what is no higher, or hangs, is aimed at first
-TRIALS = 200  # places that are tried for an aimed view
-RATIO = 0.10  # by which distance and time of the same mission may differ
+AWAY = (0.25, 0.80)  # [m] in front of the target of a view
+LOW = 0.07  # [m] boxes that are no higher, or that hang, are targets first
+TRIALS = 200  # places tried for an aimed view
+RATIO = 0.10  # largest relative difference in distance and time of equal missions
 
 
 @dataclass(frozen=True)
 class Place:
-    """One arena and the places that it is seen from; all on the host."""
+    """One arena and the places from which it is viewed; all on the host."""
 
     arena: Arena
     classes: Int8[np.ndarray, "H W"]  # the truth
     levels: Int8[np.ndarray, "H W"]
-    seed: int  # of the noise of its missions
+    seed: int  # seed of the noise of its missions
     poses: tuple[Pose, ...]  # aimed at gates, bumps and obstacles in turn
 
 
 def worlds(seed: int, first: int, count: int, views: int, config: MissionConfig) -> Iterator[Place]:
-    """Arenas `first` and on of the population of `seed`, and `views` places in each; the same for all sensors."""
+    """Arenas of the population of `seed`, starting at `first`, and `views` places in each; the same for all sensors."""
     spec, body = config.grid(AREA), config.robot.body()
     batch, seeds = draw(jax.random.key(seed), first + jnp.arange(count), FAMILIES)
     truth = jax.jit(jax.vmap(lambda arena: truth_grid(arena, spec, body)))(batch)
@@ -67,7 +67,7 @@ def aimed(
     number: int,
     spec: GridSpec,
 ) -> Pose:
-    """A place on the ground from which view `number` looks at a lintel or a bump, or in their want at any box."""
+    """A place on the ground from which view `number` looks at a lintel or a bump or, if there are none, at any box."""
     boxes = arena.boxes
     targets = np.flatnonzero(boxes.used & (boxes.overhead | (boxes.top < LOW)))
     others = np.flatnonzero(boxes.used)
@@ -77,7 +77,7 @@ def aimed(
         x, y, across = (float(v[targets[number % len(targets)]]) for v in (boxes.x, boxes.y, boxes.yaw))
     for trial in range(TRIALS):
         away = rng.uniform(*AWAY)
-        sector = 0.3 if trial < TRIALS // 2 else np.pi  # else from any side
+        sector = 0.3 if trial < TRIALS // 2 else np.pi  # otherwise from any side
         along = across + rng.choice([0, np.pi]) + rng.uniform(-sector, sector)
         px, py = x - away * np.cos(along), y - away * np.sin(along)
         i, j = int(py // spec.pitch), int(px // spec.pitch)
@@ -93,7 +93,7 @@ Look = Callable[[Place, Pose, int], View]
 
 
 def looking(config: MissionConfig, eyes: Eyes | None) -> Look:
-    """What a robot sees that stands at a known place: a function of the world, the place and the number of the view."""
+    """The view of a robot at a known place: a function of the world, the place and the number of the view."""
     settings, static = config.settings("full"), program(config, AREA)
     measure = eyes.see if eyes else partial(measured, program=static)
 
@@ -109,7 +109,7 @@ def looking(config: MissionConfig, eyes: Eyes | None) -> Look:
 @with_own_settings
 @partial(jax.jit, static_argnames=("program",))
 def measured(world: WorldState, mind: AgentState, arena: Arena, settings: MissionParams, program: MissionSpec):
-    """What a sensor that is JAX measures."""
+    """The measurement of a sensor that is in JAX."""
     return jax.vmap(partial(sense, program=program, carriage=None))(world, mind, arena, settings)
 
 
@@ -135,13 +135,13 @@ def fused(world: Place, look: Look, config: MissionConfig) -> tuple[Int8[np.ndar
 
 
 def with_rays(config: MissionConfig, rays: RayConfig) -> MissionConfig:
-    """The same missions, but that see by so many cast rays."""
+    """The same missions, with this many cast rays."""
     camera = config.camera.model_copy(update=rays.model_dump())
     return config.model_copy(update={"sensor": "raycast", "camera": camera})
 
 
 def agreement(stereo: Int8[np.ndarray, "B H W"], ours: Int8[np.ndarray, "B H W"]) -> tuple[float, float]:
-    """Share of the cells of two sensors' maps that are the same: of all, and of those that both measured."""
+    """Share of equal cells in two sensors' maps: of all cells, and of those that both measured."""
     both, equal = (stereo != Cell.UNMEASURED) & (ours != Cell.UNMEASURED), stereo == ours
     return float(equal.mean()), float(equal[both].mean())
 
@@ -170,8 +170,8 @@ def same(one: Outcome, other: Outcome, lost: bool = True) -> bool:
     """Whether two missions ended alike: the same code, and distance and time within `RATIO`.
 
     Args:
-      lost: compare also how far missions came that did not reach their goal, and when they gave up; else their code is
-        all that is asked.
+      lost: also compare how far missions came that did not reach their goal, and when they gave up; otherwise only
+        their code.
     """
     if one.code != other.code or (one.code != Code.REACHED and not lost):
         return one.code == other.code
@@ -180,7 +180,7 @@ def same(one: Outcome, other: Outcome, lost: bool = True) -> bool:
 
 @dataclass(frozen=True)
 class Score:
-    """Measured cells of maps against the truth."""
+    """Measured cells of maps compared to the truth."""
 
     right: float  # share of the measured cells
     near: float  # the same, within one cell
@@ -189,7 +189,7 @@ class Score:
 
 
 def score(maps: Sequence[Int8[np.ndarray, "H W"]], truths: Sequence[Int8[np.ndarray, "H W"]]) -> Score:
-    """Of maps of the same size."""
+    """The score of maps of the same size."""
     called, true = np.stack(maps), np.stack(truths)
     known = called != Cell.UNMEASURED
     close = np.any([(called == kind) & around(true == kind) for kind in Cell], axis=0)
@@ -209,5 +209,5 @@ def around(mask: Bool[np.ndarray, "B H W"]) -> Bool[np.ndarray, "B H W"]:
 
 
 def mean(values: Float[np.ndarray, "n"] | Bool[np.ndarray, "n"]) -> float:
-    """NaN of nothing."""
+    """The mean; NaN if there are no values."""
     return float(np.mean(values)) if len(values) else float("nan")

@@ -1,4 +1,4 @@
-"""The files of a results folder's shards: where they lie, and which there are."""
+"""The files of a results folder's shards: where they are, and which exist."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from pathlib import Path
 
 from jaxbiped.errors import InputError
 
-ROWS = "rows"  # the folder that they lie in
+ROWS = "rows"  # the folder that contains them
 
 
 def broken_shard(path: Path, error: Exception) -> InputError:
-    """The one line about a shard that is not a Parquet file, or is cut short."""
+    """The one-line message about a shard that is not a Parquet file, or is truncated."""
     first_line = (str(error).strip() or type(error).__name__).splitlines()[0]
-    return InputError(f"is damaged, or no Parquet file: {first_line}", file=path)
+    return InputError(f"is damaged, or not a Parquet file: {first_line}", file=path)
 
 
 def shard_path(folder: str | Path, shard: int) -> Path:
-    """Where a shard lies."""
+    """The path of a shard."""
     return Path(folder) / ROWS / f"part-{shard:05d}.parquet"
 
 
@@ -26,5 +26,5 @@ def shard_number(path: Path) -> int:
 
 
 def shard_paths(folder: str | Path) -> list[Path]:
-    """The shards of a folder in the order of their numbers."""
+    """The shards of a folder in order of their numbers."""
     return sorted((Path(folder) / ROWS).glob("part-*.parquet"), key=shard_number)

@@ -1,4 +1,4 @@
-"""Stopping a study when a difference is known well enough, and what is kept of it beside the rows."""
+"""Stop a study when a difference is known well enough, and the record of it that is kept beside the rows."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ STOPPING = "stopping.toml"
 
 
 class Stopping(Model):
-    """How the watching of a difference ended."""
+    """How watching a difference ended."""
 
     measure: Literal[MEASURES]
     first: str
     second: str
     width: float
-    """Asked for: [fraction], [m] or [s]."""
+    """Requested width: [fraction], [m] or [s]."""
     level: float
     looks: int
     arenas: int
-    """Used."""
+    """Number of arenas used."""
     most: int
-    """That there could have been."""
+    """Largest possible number."""
     samples: int
     """Arenas that carry the difference: for distance and time those that both solved."""
     estimate: float | None = None
@@ -36,17 +36,17 @@ class Stopping(Model):
 
     @property
     def reached(self) -> bool:
-        """Whether the interval is as tight as was asked for."""
+        """Whether the interval is as narrow as requested."""
         return self.low is not None and self.high - self.low <= self.width
 
 
 class Rule:
-    """Called with the rows of each shard of a study, true when that was enough; writes `stopping.toml` at the end.
+    """Called with the rows of each shard of a study; true once they suffice. Writes `stopping.toml` at the end.
 
     Args:
-      goal: what is watched.
-      folder: of the study.
-      most: arenas that the study can have.
+      goal: the difference to watch.
+      folder: folder of the study.
+      most: largest number of arenas that the study can have.
     """
 
     def __init__(self, goal: Goal, folder: str | Path, most: int):
@@ -57,11 +57,11 @@ class Rule:
         self.watch, self.looks = look(self.watch, self.goal, frame), self.looks + 1
         ends = enough(self.watch, self.goal)
         if ends or self.watch.arenas >= self.most:
-            write_stopping(self.folder, self.outcome())  # before the manifest says that the study is finished
+            write_stopping(self.folder, self.outcome())  # before the manifest says the study is finished
         return ends
 
     def outcome(self) -> Stopping:
-        """What was seen so far."""
+        """The state so far."""
         goal, watch = self.goal, self.watch
         return Stopping(
             measure=goal.measure,
@@ -87,6 +87,6 @@ def write_stopping(folder: str | Path, stopping: Stopping) -> None:
 
 
 def read_stopping(folder: str | Path) -> Stopping | None:
-    """What `write_stopping` wrote; None where the study was not watched."""
+    """What `write_stopping` wrote; None if the study was not watched."""
     path = Path(folder) / STOPPING
     return parse(Stopping, load_toml(path), file=path) if path.exists() else None

@@ -1,11 +1,11 @@
 """A results folder: rows as Parquet shards and a JSON manifest that says what they are.
 
-    <folder>/manifest.json          written before any row, so that what is there can always be named
+    <folder>/manifest.json          written before any row, so that the content can always be identified
     <folder>/points.parquet         the sweep points: `point`, and a column for each field that is swept
     <folder>/rows/part-00000.parquet  the rows of one block of arenas, or of another unit that the writer numbers
 
-Every file is whole or not there; a shard that is there is done. A study that was stopped is therefore its manifest and
-some of its shards, and the numbers of those that are missing say what is left to do (`study.resumption`).
+Every file is either complete or absent; a shard that exists is done. A stopped study is therefore its manifest and some
+of its shards, and the numbers of the missing ones say what is left to do (`study.resumption`).
 """
 
 from __future__ import annotations
@@ -35,16 +35,16 @@ POINTS = "points.parquet"
 
 
 class StoredRows(NamedTuple):
-    """What a results folder holds: `read(folder).rows`, or `rows, manifest = read(folder)`."""
+    """The content of a results folder: `read(folder).rows`, or `rows, manifest = read(folder)`."""
 
     rows: pl.DataFrame  # of `schema.SCHEMA`, sorted by sweep point, arena and strategy
     manifest: Manifest
 
 
 class Store:
-    """A results folder open for writing. Made by `create`; a context manager that finishes nothing by itself.
+    """A results folder open for writing. Made by `create`; a context manager that does not finish the study by itself.
 
-    On leaving by an exception, or without `finish`, the manifest says "stopped"; a folder with no shard yet is removed.
+    If left by an exception, or without `finish`, the manifest says "stopped"; a folder without shards is removed.
     """
 
     def __init__(self, folder: Path, manifest: Manifest, lock: FolderLock, made: bool):
@@ -61,17 +61,17 @@ class Store:
     def append(self, frame: pl.DataFrame, shard: int | None = None, *, compile_time: float | None = None) -> Path:
         """Write rows as one shard, `rows/part-<shard>.parquet`; by default the next number.
 
-        With `compile_time` [s], of this run so far, the times in the manifest are brought up to date, so that they
-        outlive a run that is killed.
+        With `compile_time` [s], of this run so far, the times in the manifest are updated, so that they survive if the
+        run is killed.
 
-        Raises `InputError` when the rows do not fit the schema, the shard is there already, or the disk is full.
+        Raises `InputError` if the rows do not fit the schema, the shard already exists, or the disk is full.
         """
         done = self.done()
         shard = max(done, default=-1) + 1 if shard is None else shard
         path = shard_path(self.folder, shard)
         if shard in done:
-            raise InputError("this shard is written already", file=path)
-        buffer = io.BytesIO()  # polars would turn a full disk into an error of its own
+            raise InputError("this shard is already written", file=path)
+        buffer = io.BytesIO()  # polars would raise its own error on a full disk
         validate(frame).write_parquet(buffer)
         write_whole(path, lambda file: file.write(buffer.getvalue()))
         if compile_time is not None:
@@ -79,7 +79,8 @@ class Store:
         return path
 
     def times(self, compile_time: float | None, wall_time: float | None = None) -> dict[str, float | None]:
-        """Of the manifest: all runs' seconds, this run's being `wall_time`, by default those since it was opened."""
+        """Times of the manifest: seconds of all runs; this run's are `wall_time`, by default those since it was
+        opened."""
         wall = time.monotonic() - self.started if wall_time is None else wall_time
         spent = None if compile_time is None else self.before[1] + compile_time
         return {"wall_time": self.before[0] + wall, "compile_time": spent}
@@ -89,7 +90,7 @@ class Store:
         return {shard_number(path) for path in shard_paths(self.folder)}
 
     def finish(self, *, compile_time: float | None = None, wall_time: float | None = None) -> Manifest:
-        """Write the final manifest and let go of the folder. Times are of this run; by default all of it."""
+        """Write the final manifest and release the folder. Times are of this run; by default all of it."""
         rows = int(scan(self.folder).select(pl.len()).collect().item())
         times = self.times(compile_time, wall_time)
         self.write_manifest(state="finished", shards=len(self.done()), rows=rows, **times)
@@ -103,7 +104,7 @@ class Store:
         write_whole(self.folder / MANIFEST, lambda file: file.write(text.encode()))
 
     def close(self) -> None:
-        """Let go of the folder; say "stopped" if it is not finished, remove it if nothing was written."""
+        """Release the folder; mark it "stopped" if it is not finished, remove it if nothing was written."""
         if self.lock.descriptor < 0:
             return
         try:
@@ -133,15 +134,15 @@ def create(
     device_name: str = "",
     metrics: Mapping[str, MetricFormat] | None = None,
 ) -> Store:
-    """Start a results folder: take its lock, write its sweep points and its manifest.
+    """Create a results folder: take its lock, write its sweep points and its manifest.
 
     Args:
       folder: must not exist, or be empty.
       config: the resolved configuration; its values and its hash are stored.
-      points: of a sweep: `point`, and a column for each field.
+      points: points of a sweep: `point`, and a column for each field.
       command: the command line; by default this process's.
       device_name: by default the devices that JAX sees.
-      metrics: how the numbers of columns that not all studies have are shown.
+      metrics: how the numbers in the columns of metrics are displayed.
     """
     folder = Path(folder)
     refuse_filled(folder)
@@ -166,7 +167,7 @@ def create(
             remove_if_empty(folder)
         raise as_input_error(folder, error) from None
     try:
-        refuse_filled(folder)  # another process may have come and gone before we had the lock
+        refuse_filled(folder)  # another process may have come and gone before we got the lock
     except InputError:
         lock.release()
         raise
@@ -190,12 +191,12 @@ def write_points(folder: Path, points: pl.DataFrame) -> None:
 
 
 def as_input_error(folder: Path, error: OSError | InputError) -> InputError:
-    """The one line about a folder that cannot be made or filled."""
+    """The one-line error about a folder that cannot be created or filled."""
     return error if isinstance(error, InputError) else InputError(f"cannot be written: {reason(error)}", file=folder)
 
 
 def remove_if_empty(folder: Path) -> None:
-    """Remove a folder that holds nothing."""
+    """Remove a folder if it is empty."""
     with contextlib.suppress(OSError):
         folder.rmdir()
 
@@ -209,8 +210,8 @@ def refuse_filled(folder: Path) -> None:
 
 
 def read(folder: str | Path) -> StoredRows:
-    """The rows of a folder and its manifest. One whose study is not finished reads as the rows that it has;
-    `Manifest.state` tells.
+    """The rows of a folder and its manifest. An unfinished study reads as the rows that it has so far; see
+    `Manifest.state`.
 
     Raises:
       InputError: what is missing or broken, by name.
@@ -231,7 +232,7 @@ def read(folder: str | Path) -> StoredRows:
 
 
 def scan(folder: str | Path) -> pl.LazyFrame:
-    """All rows as a lazy frame, in the order of the shards: for studies that do not fit in memory.
+    """All rows as a lazy frame, in order of the shards: for studies that do not fit in memory.
 
     Only the shards' footers are read and checked here.
     """
@@ -246,7 +247,7 @@ def scan(folder: str | Path) -> pl.LazyFrame:
         if {name: SCHEMA[name] for name in ADDED} | own != dict(SCHEMA) or not all(
             re.fullmatch(METRIC_NAME, name) and kind == pl.Float64 for name, kind in measured.items()
         ):
-            message = f"is not a shard of this format; its columns must be {', '.join(SCHEMA)}, and those of metrics"
+            message = f"is not a shard of this format; its columns must be {', '.join(SCHEMA)}, and metrics"
             raise InputError(message, file=path)
         wanted |= measured
     if not paths:
@@ -255,7 +256,7 @@ def scan(folder: str | Path) -> pl.LazyFrame:
 
 
 def read_points(folder: str | Path) -> pl.DataFrame:
-    """The sweep points of a folder: `point` (Int32, rising from 0), and a column (Float64) for each field swept.
+    """The sweep points of a folder: `point` (Int32, ascending from 0), and a column (Float64) for each swept field.
 
     A study that sweeps nothing has one point, 0, and no fields.
     """
@@ -270,12 +271,12 @@ def read_points(folder: str | Path) -> pl.DataFrame:
     fields = [name for name in points.columns if name != "point"]
     wanted = {"point": pl.Int32, **dict.fromkeys(fields, pl.Float64)}
     if dict(points.schema) != wanted or points["point"].to_list() != list(range(len(points))):
-        raise InputError("must hold `point`, rising from 0, and a column of numbers for each field swept", file=path)
+        raise InputError("must hold `point`, ascending from 0, and a column of numbers for each swept field", file=path)
     return points
 
 
 def check_complete(folder: str | Path, manifest: Manifest, rows: int) -> None:
-    """Raise `InputError` when a finished study has lost rows."""
+    """Raise `InputError` if a finished study has lost rows."""
     if manifest.state != "finished":
         return
     shards = len(shard_paths(folder))

@@ -1,4 +1,4 @@
-"""Any two things that are stored, side by side: two strategies, two sweep points, or two folders."""
+"""Any two stored sides, side by side: two strategies, two sweep points, or two folders."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Stored:
     folder: Path
     frame: pl.DataFrame  # rows of `schema.SCHEMA`
     manifest: Manifest
-    points: pl.DataFrame  # `point` and a column for each field that is swept
+    points: pl.DataFrame  # `point` and a column for each swept field
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,12 @@ class Side:
     stored: Stored
     strategy: str
     point: int
-    name: str = ""  # for people; distinct from the other side's
+    name: str = ""  # display name, distinct from the other side's
     rows: pl.DataFrame | None = None
 
     @property
     def values(self) -> dict[str, float]:
-        """The swept fields here."""
+        """The values of the swept fields here."""
         row = self.stored.points.filter(pl.col("point") == self.point).row(0, named=True)
         return {name: value for name, value in row.items() if name != "point"}
 
@@ -45,7 +45,7 @@ def open_stored(folder: str | Path) -> Stored:
     """Read a results folder.
 
     Raises:
-      InputError: no results, damaged ones, or no rows yet.
+      InputError: results that are missing, damaged or still empty.
     """
     frame, manifest = read(folder)
     if frame.is_empty():
@@ -58,18 +58,18 @@ def choose(
     strategies: tuple[str | None, str | None] = (None, None),
     points: tuple[int | None, int | None] = (None, None),
 ) -> tuple[Side, Side]:
-    """Two sides of one folder, or one of each of two.
+    """Two sides of one folder, or one side of each of two folders.
 
     Args:
-      strategies: of the first and the second side. By default the first folder's: where points or folders differ, the
-        same for both; else the project's question, or the first two that there are.
+      strategies: of the first and the second side. By default from the first folder: if points or folders differ, the
+        same for both; else the project's question, or the first two that exist.
       points: sweep points; the first by default 0, the second by default that of the first.
 
     Raises:
-      InputError: not one or two folders, a strategy or point that is not there, or twice the same.
+      InputError: not one or two folders, a strategy or point that does not exist, or twice the same side.
     """
     if len(stored) not in (1, 2):
-        raise InputError("one results folder, or two", field="folders", value=len(stored))
+        raise InputError("must be one results folder, or two", field="folders", value=len(stored))
     folders = (stored[0], stored[-1])
     first_point = 0 if points[0] is None else points[0]
     points = (first_point, first_point if points[1] is None else points[1])
@@ -98,19 +98,19 @@ def present(frame: pl.DataFrame) -> tuple[str, ...]:
 
 
 def check(side: Side, option: str) -> None:
-    """Raise `InputError` unless there are rows of a side."""
+    """Raise `InputError` unless a side has rows."""
     file = side.stored.folder
     if side.strategy not in present(side.stored.frame):
         allowed = f"must be one of {', '.join(present(side.stored.frame))}"
         raise InputError(allowed, file=file, field=option, value=side.strategy)
     count = len(side.stored.points)
     if not 0 <= side.point < count:
-        allowed = f"must be a sweep point of the folder, 0 to {count - 1}" if count > 1 else "there is one point, 0"
+        allowed = f"must be a sweep point of the folder, 0 to {count - 1}" if count > 1 else "must be 0, the only point"
         raise InputError(allowed, file=file, field=f"{option}-point", value=side.point)
 
 
 def named(sides: tuple[Side, Side], two_folders: bool) -> tuple[Side, Side]:
-    """The sides with their rows and with names that say what they differ in, and nothing more."""
+    """The sides with their rows, and with names that say only what differs between them."""
     values = [side.values for side in sides]
     folders = [side.stored.folder.name for side in sides]
     if folders[0] == folders[1]:
@@ -131,12 +131,12 @@ def check_same_arenas(first: Side, second: Side) -> None:
     """Raise `InputError` with the difference unless arena k is the same on both sides."""
     one, other = first.stored, second.stored
     if one.manifest.seed != other.manifest.seed:
-        message = f"seeds differ, so the arenas do: {one.manifest.seed} in {one.folder}, {other.manifest.seed} here"
+        message = f"seeds differ, and so do the arenas: {one.manifest.seed} in {one.folder}, {other.manifest.seed} here"
         raise InputError(message, file=other.folder)
     columns = ["arena", "family", "difficulty"]
     both = first.rows.select(columns).join(second.rows.select(columns), on="arena", suffix="_second")
     if both.is_empty():
-        raise InputError(f"has no arena that {one.folder} has, too", file=other.folder)
+        raise InputError(f"has no arena in common with {one.folder}", file=other.folder)
     apart = both.filter(
         (pl.col("family") != pl.col("family_second")) | (pl.col("difficulty") != pl.col("difficulty_second"))
     )
@@ -158,16 +158,16 @@ def side_by_side(first: Side, second: Side) -> pl.DataFrame:
     for side, other in ((first, second), (second, first)):
         rows = side.rows.join(other.rows.select("arena"), on="arena", how="semi")
         frames.append(rows.with_columns(strategy=pl.lit(side.name), point=pl.lit(0, pl.Int32)))
-    return pl.concat(frames, how="diagonal").sort("arena", maintain_order=True)  # metrics of one alone: null
+    return pl.concat(frames, how="diagonal").sort("arena", maintain_order=True)  # metrics of only one side: null
 
 
 def compare_sides(
     first: Side, second: Side, *, seed: int | None = None, resamples: int = 4999, level: float = 0.95
 ) -> tuple[Comparison, pl.DataFrame]:
-    """Compare two sides, over all arenas and in strata; and the rows that were compared.
+    """Compare two sides, over all arenas and in strata; also return the rows that were compared.
 
     Args:
-      seed: of the bootstraps; by default the study's.
+      seed: seed of the bootstraps; by default the study's.
     """
     frame = side_by_side(first, second)
     names = (first.name, second.name)

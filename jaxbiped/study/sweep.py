@@ -23,21 +23,21 @@ if TYPE_CHECKING:
     from jaxbiped.study.batching import Point
 
 POPULATION = "population"
-OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # numbers that may be left out
+OPTIONAL = (f"{POPULATION}.", "mapping.fade")  # prefixes of optional numbers
 EXAMPLES = "costs.c3, pitch, stereo.sd, robot.radius or population.bump_width"
 
 
 class SweepConfig(StudyConfig):
     """A study over a grid of values, Sobol points, or both combined: the last axis changes fastest.
 
-    Any numeric field of the config can be swept. Which of them need a compilation of their own shows by itself: points
+    Any numeric field of the config can be swept. Whether points need separate compilations is found automatically: they
     share one program unless array shapes differ.
     """
 
     question: str = ""
-    """What it asks, for its report."""
+    """The question it asks, for its report."""
     base: bool = False
-    """Whether the config with nothing changed is a point of its own, the first: what others are compared with."""
+    """Whether the unchanged config is an additional point, the first: the others are compared with it."""
     axes: Annotated[tuple[Axis, ...], tyro.conf.Fixed] = ()
     sobol: Annotated[Sobol | None, tyro.conf.Fixed] = None
 
@@ -51,21 +51,21 @@ class SweepConfig(StudyConfig):
         return self
 
     def fields(self) -> tuple[str, ...]:
-        """All fields that are swept, in the order of the columns of `points.parquet`."""
+        """All swept fields, in the order of the columns of `points.parquet`."""
         return *itertools.chain(*(axis.names() for axis in self.axes)), *(self.sobol.names() if self.sobol else ())
 
     def size(self) -> int:
-        """How many points there are."""
+        """Number of points."""
         return self.base + math.prod(len(axis.numbers()) for axis in self.axes) * (
             self.sobol.points if self.sobol else 1
         )
 
     def points(self) -> Iterator[Point]:
-        """The sweep points, each of them validated; one alone where nothing is swept.
+        """The sweep points, each validated; a single one if nothing is swept.
 
         Raises:
           InputError: a field that is unknown, not a number, or swept twice; a value that its field does not allow,
-            alone or with the others of its point; more points than memory holds.
+            alone or together with the others of its point; more points than fit in memory.
         """
         from jaxbiped.arenas.families import SIZE_X, SIZE_Y
         from jaxbiped.study.memory_limit import most_points
@@ -73,7 +73,7 @@ class SweepConfig(StudyConfig):
         fields = self.fields()
         if self.size() > (most := most_points(len(self.strategies))):
             sizes = [*(len(axis.numbers()) for axis in self.axes), *([self.sobol.points] if self.sobol else [])]
-            message = f"{' x '.join(map(str, sizes))} points are more than memory holds; at most {most} fit"
+            message = f"{' x '.join(map(str, sizes))} points do not fit in memory; at most {most} fit"
             raise InputError(message, field="axes")
         mission, population = self.mission.model_dump(), self.population.model_dump()
         for name in fields:
@@ -101,7 +101,7 @@ class SweepConfig(StudyConfig):
             yield point_at(index, values, mission, population, size_xy)
 
     def combinations(self) -> Iterator[dict[str, float]]:
-        """Field to value, for each point."""
+        """The value of each field, for each point."""
         parts: list[list[dict[str, float]]] = []
         for axis in self.axes:
             rows = zip(axis.numbers(), *axis.together.values(), strict=True)
@@ -119,10 +119,10 @@ def point_at(
     population: dict[str, Any],
     size_xy: tuple[float, float] | None = None,
 ) -> Point:
-    """One sweep point: the config with some of its fields replaced; InputError about the one that is not allowed.
+    """One sweep point: the config with some fields replaced; `InputError` about the value that is not allowed.
 
     Args:
-      size_xy: [m] of all arenas, which its pitch must divide; None: that is looked at when they are known.
+      size_xy: [m] size of all arenas, which its pitch must divide; None: check this when they are known.
     """
     from jaxbiped.mission.settings import program
     from jaxbiped.study.batching import Point
@@ -146,7 +146,7 @@ def point_at(
 
 
 def validated(model: type[Model], data: dict[str, Any], values: Mapping[str, float], prefix: str = ""):
-    """The model of a point; InputError that names the swept field, or all of them where it is how they combine."""
+    """The model of a point; `InputError` that names the swept field, or all of them if their combination is wrong."""
     try:
         return model.model_validate(data)
     except pydantic.ValidationError as error:
@@ -158,7 +158,7 @@ def validated(model: type[Model], data: dict[str, Any], values: Mapping[str, flo
 
 
 def shown(values: Mapping[str, float]) -> str:
-    """A point in words."""
+    """A point as text."""
     return ", ".join(f"{name} = {value:g}" for name, value in values.items())
 
 
@@ -169,14 +169,14 @@ def replaced(tree: dict[str, Any], path: list[str], value: float) -> dict[str, A
 
 
 def check_component_field(name: str) -> None:
-    """Raise `InputError` unless a dotted name may be that of a component's number; whether there is one shows later."""
+    """Raise `InputError` unless a dotted name may be that of a component's number; its existence is checked later."""
     kind, _, field = name.partition(".")
     if not field.isidentifier():
         raise InputError(f"must be {kind}.<field>", field=f"axis {name}")
 
 
 def check_field(name: str, config: Mapping[str, Any]) -> None:
-    """Raise `InputError` unless a dotted name is that of a number of a config."""
+    """Raise `InputError` unless a dotted name is that of a number in a config."""
     leaves = dict(flat(config))
     field = f"axis {name}"
     if name not in leaves:

@@ -1,4 +1,4 @@
-"""Missions under many cost vectors on the same arenas: what a search for costs asks again and again."""
+"""Missions under many cost vectors on the same arenas, which a search for costs needs repeatedly."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from jaxbiped.mission.settings import MissionConfig, MissionParams, program
 from jaxbiped.planning import Costs
 from jaxbiped.study.evaluation import draw
 
-VECTORS, BLOCK = 8, 16  # cost vectors and arenas that one queue has room for
-SLOTS = 16  # missions at once: a queue that is not much longer than its slots idles most of them at its end
+VECTORS, BLOCK = 8, 16  # capacity of one queue in cost vectors and arenas
+SLOTS = 16  # missions at once: in a queue not much longer than its slots, most of them would idle at its end
 NAMES = ("c0", "c1", "c2", "c3", "c4")  # in the order of the cost vectors
 
 
@@ -44,14 +44,14 @@ class Trials:
         index: Int[np.ndarray, "A"],
         on_progress: OnProgress = lambda tally: None,
     ) -> Result:
-        """All cost vectors on all arenas `index`: results [P, A], on the host.
+        """Run all cost vectors on all arenas `index`: results [P, A], on the host.
 
-        The same arenas with the same noise as those of a study with this seed: common random numbers, so that
-        differences between cost vectors are theirs. Any number of vectors and arenas shares one compiled program.
+        Uses the same arenas with the same noise as a study with this seed: common random numbers, so that differences
+        are due to the cost vectors alone. Any number of vectors and arenas shares one compiled program.
         Consumes `jax.random.key(seed)`.
 
         Args:
-          on_progress: called with the tally of the missions so far, now and then.
+          on_progress: called from time to time with the tally of the missions so far.
         """
         static = program(self.mission, (SIZE_X, SIZE_Y))
         base = self.mission.settings(self.strategy)
@@ -88,21 +88,21 @@ class Trials:
 
         if pieces:
             deal(pieces[0])  # compiles, once
-        # All missions are played by other threads: an interrupt here must not leave a running program behind.
+        # All missions are played by other threads: an interrupt here must not leave a program running.
         with ThreadPoolExecutor(cores()) as pool:
             try:
                 list(pool.map(play, pieces))
             except BaseException:
-                stop.set()  # it shall not wait for all queues either
+                stop.set()  # nor wait for all queues
                 pool.shutdown(cancel_futures=True)
                 raise
         return out
 
 
 def objective(result: Result, penalty: float) -> Float[np.ndarray, "*S"]:
-    """Seconds of each mission: its time where it reached the goal, `penalty` where it failed, and never more than that.
+    """Seconds of each mission: its time if it reached the goal, `penalty` if it failed, and never more than that.
 
-    The mean of it is the penalised average run time by which solvers are compared that may fail.
+    Its mean is the penalised average run time by which solvers that may fail are compared.
     """
     time = np.minimum(result.time.astype(float), penalty)
     return np.where(result.code == Code.REACHED, time, penalty)

@@ -1,4 +1,4 @@
-"""Costs tuned on training arenas by gradient, and judged on test arenas against those that they began from."""
+"""Tune costs on training arenas by gradient, and evaluate them on test arenas against the initial costs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ START, TUNED, SWEPT, DURATIONS = "start", "tuned", "sweep", "durations"
 PAIRS = ((TUNED, START), (TUNED, SWEPT), (SWEPT, START), (DURATIONS, START))
 
 
-# (costs [P, 5], arenas [A], what is called with a tally of the missions): results [P, A]; `trials.Trials` is one
+# (costs [P, 5], arenas [A], callback for a tally of the missions) -> results [P, A]; such as `trials.Trials`
 Play = Callable[[np.ndarray, np.ndarray, OnProgress], Result]
 
 
@@ -43,31 +43,31 @@ class Gap:
 
 @dataclass(frozen=True)
 class Tuning:
-    """What came of it."""
+    """The result of tuning."""
 
     costs: dict[str, tuple[float, ...]]  # C0 to C4 by name
-    history: pl.DataFrame  # a row a step: costs before it, objective [s] of its missions, and of `start` on its arenas
-    swept: pl.DataFrame  # a row a point of the sweep
-    test: pl.DataFrame  # a row a test arena and set of costs
+    history: pl.DataFrame  # one row per step: costs, objective [s] of its missions, and of `start` on its arenas
+    swept: pl.DataFrame  # one row per point of the sweep
+    test: pl.DataFrame  # one row per test arena and set of costs
     gaps: tuple[Gap, ...]
 
 
 def tune(
     config: TuneConfig, play: Play | None = None, on_progress: Callable[[Progress], None] = lambda progress: None
 ) -> Tuning:
-    """Tune costs, sweep them for comparison, and judge both, and those that durations stand for, on test arenas.
+    """Tune costs, sweep them for comparison, and evaluate both, and those that durations imply, on test arenas.
 
     The descent follows the signs of the gradient of the perturbed objective (`search`; sign descent of optax) in the
-    logarithms of C1 to C4 over C0, inside the box [low, high]. Signs, because now and then one perturbed mission falls:
-    a thousand seconds in one arena, where the slopes to be found are a few. Adam, which remembers squares, is thrown
-    off by a single one for all of its steps. What is given is the mean of the logarithms over the second half of the
-    steps, since a noisy descent wanders about the place that it has found.
+    logarithms of C1 to C4 over C0, inside the box [low, high]. It uses signs because now and then one perturbed mission
+    falls: a thousand seconds in one arena, where the slopes of interest are a few. Adam, which keeps squares, would be
+    disturbed by a single one for all of its steps. The result is the mean of the logarithms over the second half of the
+    steps, since a noisy descent wanders about the optimum that it has found.
 
-    Costs are perturbed, and not the planner smoothed: a softmin over the paths of a known map knows nothing of C4,
-    which acts through what is measured on the way, nor of failures, and a mission's time is no function of its path's
+    Costs are perturbed instead of smoothing the planner: a softmin over the paths of a known map captures neither C4,
+    which acts through what is measured on the way, nor failures, and a mission's time is not a function of its path's
     cost.
 
-    The best point of the sweep is the one with the least objective over all training arenas.
+    The best point of the sweep is the one with the lowest objective over all training arenas.
 
     Consumes the streams (seed, step) of numpy's `default_rng`, and `jax.random.key(seed)` for arenas and noise.
     """
@@ -112,7 +112,7 @@ def vector(costs: CostConfig) -> Float[np.ndarray, "5"]:
 
 
 def from_durations(mission: MissionConfig) -> Float[np.ndarray, "5"]:
-    """C0 to C3 from the times of the mission's primitives, measurements included; its own C4 and least C0."""
+    """C0 to C3 from the durations of the mission's primitives, including measurements; its own C4 and minimum C0."""
     found = np.append(fit(mission.durations, measuring=True).costs, mission.costs.c4)
     return np.maximum(found, [0.1, 0.0, 0.0, 0.0, 0.0])
 
@@ -124,7 +124,7 @@ def descend(
     began: Float[np.ndarray, "N"],
     run: Callable[[np.ndarray, np.ndarray], Result],
 ) -> tuple[Float[np.ndarray, "5"], pl.DataFrame]:
-    """The descent: the costs it ends at, and its history."""
+    """Run the descent; return the costs it ends at, and its history."""
     box = np.log([config.low, config.high])
     c0, tiny = start[0], np.exp(box[0])
     place = np.clip(np.log(np.maximum(start[1:] / c0, tiny)), *box)
@@ -154,7 +154,7 @@ def spread_out(
     train: Int[np.ndarray, "N"],
     run: Callable[[np.ndarray, np.ndarray], Result],
 ) -> pl.DataFrame:
-    """The sweep: Sobol points, their objective, and the share of missions that arrived."""
+    """Run the sweep: Sobol points, their objective, and the share of missions that arrived."""
     places = sobol(config.sweep_points, *np.log([config.low, config.high]), 4, config.seed)
     points = c0 * np.exp(np.column_stack([np.zeros(len(places)), places]))
     result = run(points, train)
@@ -164,7 +164,7 @@ def spread_out(
 
 
 def gap(first: str, second: str, f: int, s: int, result: Result, seconds: Float[np.ndarray, "P A"], seed: int) -> Gap:
-    """Rows `f` and `s` of the results compared. `seed` seeds the bootstraps."""
+    """Compare rows `f` and `s` of the results. `seed` seeds the bootstraps."""
     reached = result.code == Code.REACHED
     both = reached[f] & reached[s]
     mean, _ = mean_and_median(np.round(seconds[f] - seconds[s], 4), seed=seed)

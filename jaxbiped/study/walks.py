@@ -28,7 +28,7 @@ def walk_all(
     population_of: Int[np.ndarray, "P"],
     eyes: Eyes | None = None,
 ) -> Result:
-    """Every arena under every point, as `queues.run_all`: results [P, count], on the host."""
+    """Run every arena under every point, as `queues.run_all`: results [P, count], on the host."""
     kinds = jax.tree.leaves(points)[0].shape[0]
     point, arena = (grid.ravel() for grid in np.meshgrid(np.arange(kinds), np.arange(count), indexing="ij"))
     place = arena + seeds.shape[0] * population_of[point]

@@ -1,4 +1,4 @@
-"""What a worker of a cluster does: shards, one at a time, and saying how far it is."""
+"""The work of a cluster's worker: shards, one at a time, and reports of its progress."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ from jaxbiped.study.batching import Group, Shard
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
 
-PACKAGES = ("jaxbiped", "jax", "jaxlib", "numpy", "mujoco", "distributed")  # of one version everywhere, and Python
-PAUSE = 1.0  # [s] between two words on how far a shard is
+PACKAGES = ("jaxbiped", "jax", "jaxlib", "numpy", "mujoco", "distributed")  # the same version everywhere, as for Python
+PAUSE = 1.0  # [s] between two progress reports of a shard
 ONE_AT_A_TIME = threading.Lock()
 
 Compute = Callable[..., pl.DataFrame]
 
 
 def versions() -> dict[str, str | None]:
-    """Of what rows may depend on, as Dask can ask any worker for it, even one without this package."""
+    """Versions that rows may depend on, in a form that Dask can request from any worker, even without this package."""
     return chosen(get_package_info(PACKAGES))
 
 
 def chosen(packages: Mapping[str, str | None]) -> dict[str, str | None]:
-    """Those of `PACKAGES` and of Python, among all that Dask tells."""
+    """The versions of `PACKAGES` and of Python, among all that Dask reports."""
     return {name: packages.get(name) for name in ("python", *PACKAGES)}
 
 
 def refuse_other_versions(worker: str, there: Mapping[str, str | None], here: Mapping[str, str | None]) -> None:
-    """Raise `InputError` that names a worker and what it has of other versions than the client."""
+    """Raise `InputError` that names a worker and its versions that differ from the client's."""
     changes = [
         f"{name} {there.get(name) or 'nothing'} (here {here[name]})" for name in here if there[name] != here[name]
     ]
     if changes:
-        message = f"has {', '.join(changes)}; all workers must have what the client has"
+        message = f"has {', '.join(changes)}; all workers must have the client's versions"
         raise InputError(message, field=f"worker {worker}")
 
 
 def devices() -> tuple[int, str]:
-    """How many devices this process has, and of what kind."""
+    """The number of devices of this process, and their kind."""
     return jax.local_device_count(), jax.local_devices()[0].device_kind
 
 
 def refuse_other_device(worker: str, there: str, wanted: str) -> None:
-    """Raise `InputError` where rows would be of several kinds of devices."""
+    """Raise `InputError` if rows would come from several kinds of devices."""
     if there != wanted:
         raise InputError(
             f"must have devices of the kind of the others, {wanted}", field=f"worker {worker}", value=there
@@ -60,7 +60,7 @@ def refuse_other_device(worker: str, there: str, wanted: str) -> None:
 
 @cache
 def clock() -> CompileClock:
-    """Of this process."""
+    """The compile clock of this process."""
     return CompileClock()
 
 
@@ -73,15 +73,15 @@ def work(
     wanted: Mapping[str, str | None],
     kind: str,
 ) -> tuple[pl.DataFrame, str, float]:
-    """The task: the rows of a shard, the worker's address, and seconds that it spent compiling.
+    """The task: return the rows of a shard, the worker's address, and the seconds that it spent compiling.
 
     Args:
       compute: as `evaluate.compute`.
-      topic: of the events that say how far it is: (shard number, missions ended, of these reached).
-      wanted, kind: versions and the kind of device that a worker must have.
+      topic: topic of the progress events: (shard number, missions ended, of these reached).
+      wanted, kind: versions and kind of device that a worker must have.
 
     Raises:
-      InputError: this worker has others.
+      InputError: this worker has other ones.
     """
     worker = get_worker()
     refuse_other_versions(worker.address, versions(), wanted)
@@ -93,7 +93,7 @@ def work(
             last[0] = time.monotonic()
             worker.log_event(topic, (shard.number, tally.ended, tally.reached))
 
-    with ONE_AT_A_TIME:  # its queues use all threads that the worker has
+    with ONE_AT_A_TIME:  # its queues use all threads of the worker
         before = clock().seconds
         frame = compute(config, group, shard, report, workers=worker.state.nthreads)
         return frame, worker.address, clock().seconds - before

@@ -1,4 +1,4 @@
-"""The scene of the page: what the arrays of a mission look like in viser."""
+"""The scene of the page: the arrays of a mission drawn in viser."""
 
 from __future__ import annotations
 
@@ -26,23 +26,23 @@ LAYERS = {
     "all_points": ("Points, all so far", False),
     "voxels": ("3D grid", False),
     "robot": ("Robot", True),
-    "belief": ("Where it believes to be", True),
+    "belief": ("Believed pose", True),
     "camera": ("Camera", True),
     "arena": ("True boxes", True),
-}  # name: label, whether it is shown at first
-HEAVY = ("points", "all_points", "voxels")  # sent only where they are shown
-POINT_SIZE, SMALL_POINT, MANY = 0.006, 0.0035, 4000  # [m], [m] where there are many, and how many that are
-PAPER = 0.0004  # [m] of what is unmeasured above the floor
-FRUSTUM = 0.10  # [m] drawn of the camera's view
+}  # name: label, whether it is initially shown
+HEAVY = ("points", "all_points", "voxels")  # sent only if they are shown
+POINT_SIZE, SMALL_POINT, MANY = 0.006, 0.0035, 4000  # [m], [m] if there are many; number of points that counts as many
+PAPER = 0.0004  # [m] height of unmeasured cells above the floor
+FRUSTUM = 0.10  # [m] length of the drawn camera frustum
 AROUND, SUN, SUN_FROM = 1.9, 1.8, (-1.0, -2.0, 4.0)  # intensities; [m]
-FIELD_OF_VIEW = math.radians(36)  # of who looks at the page, up and down
-VIEW = np.array([-0.52, -1.35, 1.2])  # of the arena's width, from what is looked at: where one looks from
-PANEL_BESIDE, PANEL_BELOW = 0.23, 0.55  # of the arena's width that one looks beside it, for the panel to be there
+FIELD_OF_VIEW = math.radians(36)  # vertical field of view of the page
+VIEW = np.array([-0.52, -1.35, 1.2])  # viewpoint relative to the target, in arena widths
+PANEL_BESIDE, PANEL_BELOW = 0.23, 0.55  # shift of the target, in arena widths, to make room for the panel
 WIDE = 1.6  # width by height of a window for which `VIEW` is right
 
 
 class Canvas:
-    """What is drawn of one mission."""
+    """The drawing of one mission."""
 
     def __init__(self, server: Any):
         self.server = server
@@ -53,7 +53,7 @@ class Canvas:
         self.light()
 
     def light(self) -> None:
-        """Even light from all around, so that the map's colours are the legend's, and a sun that casts shadows."""
+        """Even light from all around, so that the map's colours match the legend, and a sun that casts shadows."""
         scene = self.server.scene
         scene.world_axes.visible = False
         scene.configure_environment_map(None)
@@ -62,7 +62,7 @@ class Canvas:
         scene.add_light_directional("/light/sun", intensity=SUN, cast_shadow=True, position=SUN_FROM)
 
     def show(self, mission: Shown, puppet: Puppet) -> None:
-        """Draw what stays of a mission, and the robot; what another one left is removed."""
+        """Draw the static parts of a mission, and the robot; remove those of a previous one."""
         for handle in (*self.still, *self.boxes, *self.bodies, *self.moving.values()):
             handle.remove()
         self.still, self.boxes, self.bodies, self.moving = [], [], [], {}
@@ -74,7 +74,7 @@ class Canvas:
                 opacity=solid.opacity if solid.opacity < 1 else None, cast_shadow=box,
             )  # fmt: skip
             (self.boxes if box else self.still).append(handle)
-        width, depth = (float(side) for side in mission.log.size_xy)  # an image is white, whatever the light
+        width, depth = (float(side) for side in mission.log.size_xy)  # an image is white in any light
         paper = self.server.scene.add_image("/arena/paper", np.full((8, 8, 3), 255, np.uint8), width, depth,
                                             position=(width / 2, depth / 2, PAPER), cast_shadow=False)  # fmt: skip
         self.still.append(paper)
@@ -83,7 +83,7 @@ class Canvas:
         first.fov, (first.position, first.look_at) = FIELD_OF_VIEW, viewpoint(mission.log, WIDE)
 
     def robot(self, puppet: Puppet) -> None:
-        """The bodies, each a frame with its geoms; the camera; and the mark of where the robot believes to be."""
+        """The bodies, each a frame with its geoms; the camera; and the mark of the believed pose."""
         scene = self.server.scene
         for name, parts in zip(puppet.bodies, puppet.parts(), strict=True):
             self.bodies.append(scene.add_frame(f"/robot/{name}", show_axes=False))
@@ -102,7 +102,7 @@ class Canvas:
         )
 
     def pose(self, puppet: Puppet, qpos: Float[np.ndarray, "19"], looks_down: bool, time: float) -> None:
-        """Put the robot where it is, and boxes that move where they are at a time [s]."""
+        """Move the robot to its state, and moving boxes to their positions at a time [s]."""
         for outline, handle in zip(self.mission.log.outlines, self.boxes, strict=True):
             if outline.way:
                 handle.position = (*outline.moved(time), 0.0)
@@ -114,14 +114,14 @@ class Canvas:
         camera.position, camera.wxyz = eye.position[0], looking_down(eye.wxyz[0], pitch)
 
     def moment(self, t: int, on: dict[str, bool]) -> None:
-        """Draw what the robot knew at moment `t`, those layers that are on."""
+        """Draw the robot's knowledge at moment `t`, for those layers that are on."""
         for name in LAYERS:
             self.layer(name, t, on[name])
         if self.mission.log.pictures:
             self.moving["camera"].image = self.mission.log.pictures[t].left
 
     def layer(self, name: str, t: int, on: bool) -> None:
-        """Draw one layer as it is at moment `t`, or hide it."""
+        """Draw one layer as of moment `t`, or hide it."""
         scene, log = self.server.scene, self.mission.log
         if name in HEAVY and not on:
             if handle := self.moving.pop(name, None):
@@ -154,7 +154,7 @@ class Canvas:
                 mark.position, mark.wxyz = (x, y, z + 0.01), (math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2))
 
     def map(self, tiles: layers.Bricks, on: bool) -> None:
-        """The tiles; once they are there they are moved and coloured, which does not flicker."""
+        """Draw the tiles; existing ones are moved and coloured, which avoids flicker."""
         handle = self.moving.get("map")
         if handle is None:
             self.moving["map"] = self.bricks("map", tiles, on)
@@ -173,15 +173,15 @@ class Canvas:
 
 
 def viewpoint(log: MissionLog, aspect: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Where [m] to look from, and at what, for the whole arena to be seen beside the panel, or above it.
+    """Viewpoint [m] and target from which the whole arena is visible beside the panel, or above it.
 
     Args:
-      aspect: of the window, width by height.
+      aspect: aspect ratio of the window, width by height.
     """
     width, depth = (float(side) for side in log.size_xy)
     size = max(width, depth)
     far = size * max(1.0, (WIDE if aspect > 1 else 0.92) / max(aspect, 0.2))
-    towards = np.array([*VIEW[:2], 0.0]) / np.hypot(*VIEW[:2])  # who looks; the right of them lies square to it
+    towards = np.array([*VIEW[:2], 0.0]) / np.hypot(*VIEW[:2])  # direction of the viewer; perpendicular to their right
     right = np.array([-towards[1], towards[0], 0.0])
     aside = PANEL_BESIDE * size * right if aspect > 1 else PANEL_BELOW * far * towards
     middle = np.array([width / 2, depth / 2, 0.0]) + aside

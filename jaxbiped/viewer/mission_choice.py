@@ -1,4 +1,4 @@
-"""What a results folder has to show: one recorded mission, several, or those of a study, which are played again."""
+"""The missions in a results folder: one recorded mission, several, or those of a study, which are played again."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from jaxbiped.study.replay import mission_of, play_again
 from jaxbiped.study.stored_series import Side, Stored, check, open_stored, present
 from jaxbiped.viewer.mission_file import Shown, ending, shown
 
-FAILURES = 40  # of a strategy that are listed; any other can be asked for by its number
-KEPT = 8  # missions that were played last, kept
+FAILURES = 40  # failures listed per strategy; any other can be chosen by its number
+KEPT = 8  # number of recently played missions kept
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A mission of a results folder, by its name in a list."""
+    """A mission of a results folder, with its name in a list."""
 
     label: str
     arena: int = 0  # of a study; else the number of the file
@@ -33,17 +33,18 @@ Place = tuple[str, int, int]  # strategy, sweep point, arena
 
 @runtime_checkable
 class Missions(Protocol):
-    """What the page needs to offer missions. A folder of files has one strategy and one point, without names."""
+    """The interface through which the page offers missions. A folder of files has one strategy and one point,
+    unnamed."""
 
     strategies: tuple[str, ...]
     points: tuple[str, ...]
 
     def choices(self, strategy: str, point: int) -> tuple[Choice, ...]:
-        """Those worth a look, the first of them first."""
+        """Missions worth seeing, with the default first."""
         ...
 
     def open(self, strategy: str, point: int, arena: int) -> Shown:
-        """One of them. InputError: it is not there, or cannot be played here."""
+        """Open one of them. InputError: it does not exist, or cannot be played here."""
         ...
 
 
@@ -71,7 +72,7 @@ class Files:
 
 
 class Study:
-    """Missions of `jaxbiped compare` or `jaxbiped sweep`: stored are their ends; they are played again to be seen."""
+    """Missions of `jaxbiped compare` or `jaxbiped sweep`: only their ends are stored; they are replayed to be shown."""
 
     def __init__(self, stored: Stored):
         self.stored = stored
@@ -80,7 +81,7 @@ class Study:
         self.kept: dict[Place, Shown] = {}
 
     def point_name(self, row: Mapping[str, Any]) -> str:
-        """A sweep point by what is swept."""
+        """A sweep point as text, by its swept fields."""
         said = ", ".join(f"{name.rpartition('.')[2]} {row[name]:g}" for name in row if name != "point")
         return f"{row['point']}: {said}" if said else "0"
 
@@ -94,7 +95,7 @@ class Study:
         return choices(self.rows(strategy, point))
 
     def open(self, strategy: str, point: int, arena: int) -> Shown:
-        """Play one again; that compiles a mission, once for each config."""
+        """Replay one; this compiles a mission, once for each config."""
         rows = self.rows(strategy, point).filter(pl.col("arena") == arena)
         if rows.is_empty():
             found = self.stored.frame["arena"]
@@ -108,7 +109,7 @@ class Study:
         return self.kept[key]
 
     def play(self, row: Mapping[str, Any]) -> Shown:
-        """The mission of a row, played again."""
+        """Replay the mission of a row."""
         manifest, arena, strategy = self.stored.manifest, row["arena"], row["strategy"]
         values = Side(self.stored, strategy, row["point"]).values
         mission = play_again(manifest, row["point"], values, strategy, [arena])[0]
@@ -125,7 +126,7 @@ class Study:
 
 
 def choices(rows: pl.DataFrame) -> tuple[Choice, ...]:
-    """Missions worth a look among rows of one strategy: median, best and worst time, then failures by their codes."""
+    """Missions worth seeing among rows of one strategy: median, best and worst time, then failures by their codes."""
     arrived = rows.filter(pl.col("success")).sort("time", "arena")
     found = []
     if len(arrived):
@@ -139,13 +140,13 @@ def choices(rows: pl.DataFrame) -> tuple[Choice, ...]:
 
 
 def missions(result: Path) -> Missions:
-    """What a result has to show.
+    """The missions of a result.
 
     Args:
-      result: a folder of `jaxbiped run`, `compare` or `sweep`, one that holds several of `run`, or a recorded mission.
+      result: a folder of `jaxbiped run`, `compare` or `sweep`, a folder of several of `run`, or a recorded mission.
 
     Raises:
-      InputError: there is no such folder, or nothing in it to be shown.
+      InputError: the folder does not exist, or has nothing to show.
     """
     if result.is_file():
         return Files(result.parent, (result,))

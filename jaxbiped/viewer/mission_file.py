@@ -1,4 +1,4 @@
-"""A mission that is shown: its log, and what else the viewer has to know of it."""
+"""A mission to show: its log, and everything else that the viewer needs."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ class Shown:
     log: MissionLog
     config: MissionConfig
     title: str  # the arena's name and the strategy
-    ending: str  # how it went, in a sentence
-    note: str = ""  # what else is to be said
+    ending: str  # the outcome, in a sentence
+    note: str = ""  # further remarks
 
 
 def shown(path: Path) -> Shown:
-    """The mission of a file that `mission.recording.save_log` wrote.
+    """The mission in a file written by `mission.recording.save_log`.
 
     Raises:
-      InputError: no log, a damaged one, or one whose config this version does not know.
+      InputError: not a log, a damaged one, or one whose config this version does not know.
     """
     log, facts = load_log(path)
     config = config_of(facts, path)
@@ -41,7 +41,7 @@ def shown(path: Path) -> Shown:
 
 
 def config_of(facts: Mapping[str, Any], path: Path) -> MissionConfig:
-    """The mission's config, or what the file says of it; the default for what it does not say."""
+    """The mission's config according to the file; defaults for missing values."""
     said = facts.get("args", {})
     brief = {name: said[name] for name in ("sensor", "executor") if name in said}
     try:
@@ -51,7 +51,7 @@ def config_of(facts: Mapping[str, Any], path: Path) -> MissionConfig:
 
 
 def ending(log: MissionLog, facts: Mapping[str, Any]) -> str:
-    """How a mission went, for people."""
+    """The outcome of a mission, as text."""
     outcome = log.outcome.replace("_", " ") or "not ended"
     measured = f", {facts['measurements']} measurements" if "measurements" in facts else ""
     walked = f"{100 * facts['distance']:.0f} cm in " if "distance" in facts else ""

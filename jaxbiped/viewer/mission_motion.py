@@ -1,4 +1,4 @@
-"""A mission as a movement: the robot's state at every time of it."""
+"""A mission as a movement: the robot's state at every time."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from jaxbiped.mission.recorded_driver import NAMES
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.viewer.puppet import Puppet
 
-MEASURE = 10.0  # [s] of a measurement, where the mission's config does not say
+MEASURE = 10.0  # [s] duration of a measurement if not in the mission's config
 ROWS = 48  # states of a movement
 PRIMITIVES = {name: primitive for primitive, name in NAMES.items()}
-Frame = tuple[float, float, float, float]  # x, y, z [m] and yaw [rad] of the middle between the feet
+Frame = tuple[float, float, float, float]  # x, y, z [m] and yaw [rad] of the midpoint of the feet
 
 
 @dataclass(frozen=True)
 class Motion:
-    """States of `biped.model.robot_spec` at times that rise."""
+    """States of `biped.model.robot_spec` at ascending times."""
 
     time: Float[np.ndarray, "F"]  # [s] of the mission's clock
     qpos: Float[np.ndarray, "F 19"]
 
     def at(self, time: float) -> Float[np.ndarray, "19"]:
-        """The state at a time [s], in between the nearest; before the first and after the last, that one."""
+        """The state at a time [s], interpolated; before the first and after the last, that one."""
         k = int(np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 1))
         if k == len(self.time) - 1 or time <= self.time[0]:
             return np.array(self.qpos[k], float)
@@ -58,18 +58,18 @@ class Tape:
 
 
 def motion(log: MissionLog, puppet: Puppet, measure: float = MEASURE) -> Motion:
-    """The whole of a mission.
+    """The movement of a whole mission.
 
-    A simulated biped moves as it did, its movements stretched over the time that the mission's clock counts for them;
-    while it measures, which takes `measure` [s] before each moment, it stands. Of others only the places are known, at
-    each moment: they walk from one to the next as the gait generator plans it. Where it cannot (a leg does not reach),
-    the robot glides.
+    A simulated biped moves as it did, with its movements stretched to their time on the mission's clock; while it
+    measures, which takes `measure` [s] before each moment, it stands still. For other robots only the positions at each
+    moment are known: they walk from one to the next as planned by the gait generator. Where that fails (a leg does not
+    reach), the robot glides.
     """
     return walked(log, puppet, measure) if log.walk is not None else planned(log, puppet, measure)
 
 
 def walked(log: MissionLog, puppet: Puppet, measure: float) -> Motion:
-    """Of a simulated biped."""
+    """The movement of a simulated biped."""
     moment = np.asarray(log.walk.moment, float)
     t = np.minimum(moment.astype(int), len(log.time) - 2)
     ends = arrivals(log, measure)
@@ -78,7 +78,7 @@ def walked(log: MissionLog, puppet: Puppet, measure: float) -> Motion:
 
 
 def planned(log: MissionLog, puppet: Puppet, measure: float) -> Motion:
-    """Of a robot whose places alone are known."""
+    """The movement of a robot of which only the positions are known."""
     count = len(log.time)
     z = log.true_z if log.true_z is not None else np.zeros(count)
     squat = [bool(each) for each in log.squat] if log.squat is not None else [False] * count
@@ -98,7 +98,7 @@ def planned(log: MissionLog, puppet: Puppet, measure: float) -> Motion:
 
 
 def move_between(here: Frame, there: Frame, action: str, rise: int, squat: bool) -> Move:
-    """The decision that leads from one place to another."""
+    """The decision that leads from one position to another."""
     turn = math.remainder(there[3] - here[3], 2 * math.pi)
     dx, dy, cos, sin = there[0] - here[0], there[1] - here[1], math.cos(there[3]), math.sin(there[3])
     primitive = PRIMITIVES.get(action, Primitive.NONE)
@@ -108,16 +108,16 @@ def move_between(here: Frame, there: Frame, action: str, rise: int, squat: bool)
 def play(
     asked: tuple[Request, ...], here: Frame, there: Frame, puppet: Puppet
 ) -> tuple[Float[np.ndarray, "n"], Float[np.ndarray, "n 19"]]:
-    """States of movements one after the other, and at which share of the time they are taken.
+    """States of successive movements, and the fractions of the time at which they are reached.
 
-    What they miss the place by, they are moved by on the way.
+    The remaining error in position is distributed over the movement.
 
     Raises:
-      InputError: the robot cannot move so.
+      InputError: the robot cannot make this movement.
     """
     tapes = [tape(request, puppet.robot) for request in asked]
     if not tapes:
-        raise InputError("nothing to be played")
+        raise InputError("nothing to play")
     froms = [here]
     for each in tapes:
         froms.append(joined(froms[-1], each.end))
@@ -138,7 +138,7 @@ def play(
 def glide(
     here: Frame, there: Frame, squat: bool, squats: bool, puppet: Puppet
 ) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2 19"]]:
-    """The robot turns, and then goes, standing still."""
+    """The robot turns and then glides, in a standing posture."""
     turned = abs(math.remainder(there[3] - here[3], 2 * math.pi))
     share = turned / (turned + 4 * math.dist(here[:2], there[:2]) + 1e-9)  # [rad] against [m]: a turn is fast
     states = puppet.home(*here[:3], there[3], squat), puppet.home(*there, squats)
@@ -147,7 +147,7 @@ def glide(
 
 @functools.lru_cache(maxsize=1024)
 def tape(request: Request, robot: RobotModelConfig) -> Tape:
-    """A movement. InputError: the robot cannot move so."""
+    """A movement. InputError: the robot cannot make it."""
     table = generate(request, robot)
     rows = np.unique(np.linspace(0, len(table.q) - 1, ROWS).round().astype(int))
     feet = table.feet[-1].mean(axis=0)
@@ -162,14 +162,14 @@ def tape(request: Request, robot: RobotModelConfig) -> Tape:
 
 
 def joined(frame: Frame, step: Frame) -> Frame:
-    """A frame in a frame."""
+    """A frame given relative to another frame."""
     x, y, z, yaw = frame
     cos, sin = math.cos(yaw), math.sin(yaw)
     return x + cos * step[0] - sin * step[1], y + sin * step[0] + cos * step[1], z + step[2], yaw + step[3]
 
 
 def arrivals(log: MissionLog, measure: float) -> Float[np.ndarray, "n"]:
-    """When [s] what was done after each moment but the last had been done: a measurement before the next moment."""
+    """Times [s] at which the action after each moment but the last ends: one measurement before the next moment."""
     ends = log.time[1:] - measure
     if len(ends):
         ends[-1] = log.time[-1]  # nothing is measured any more
@@ -177,7 +177,7 @@ def arrivals(log: MissionLog, measure: float) -> Float[np.ndarray, "n"]:
 
 
 def rising(time: Float[np.ndarray, "F"], qpos: Float[np.ndarray, "F nq"]) -> Motion:
-    """Without states of the same time but the last of them."""
+    """The motion with only the last of the states that have the same time."""
     time = np.maximum.accumulate(time)
     keep = np.append(np.diff(time) > 1e-9, True)
     return Motion(time[keep], qpos[keep])

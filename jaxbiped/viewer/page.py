@@ -1,4 +1,4 @@
-"""The page: one mission and its controls, the same for all who look at it."""
+"""The page: one mission and its controls, the same for all viewers."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ LOOKED_DOWN = "Look-down"  # the action after which the camera was tilted to the
 
 
 class Page:
-    """Draws a mission at a time of it, and moves on while it plays. `server` is a `viser.ViserServer`."""
+    """Draws a mission at a time, and advances while it plays. `server` is a `viser.ViserServer`."""
 
     def __init__(self, server: Any, mission: Shown, missions: Missions | None = None, at: Place | None = None):
         """
         Args:
-          missions: where others can be chosen.
+          missions: the source of other missions.
           at: strategy, sweep point and arena of `mission` there.
         """
         self.server, self.lock = server, threading.RLock()
@@ -70,8 +70,8 @@ class Page:
             box.on_update(lambda _, name=name: self.switch(name))
 
     def greet(self, client: Any) -> None:
-        """Turn who comes to the arena; a narrow window needs more distance than a wide one."""
-        with contextlib.suppress(Exception):  # who has left again
+        """Turn a new client to the arena; a narrow window needs more distance than a wide one."""
+        with contextlib.suppress(Exception):  # the client may have left again
             client.camera.fov = FIELD_OF_VIEW
             client.camera.position, client.camera.look_at = viewpoint(self.mission.log, client.camera.aspect)
 
@@ -94,16 +94,16 @@ class Page:
             self.seek(float(log.time[0]))
 
     def on(self) -> dict[str, bool]:
-        """Which layers are shown."""
+        """The layers that are shown."""
         return {name: bool(box.value) for name, box in self.boxes.items()}
 
     def switch(self, name: str) -> None:
-        """Show or hide a layer, as its box says."""
+        """Show or hide a layer, according to its checkbox."""
         with self.lock, self.server.atomic():
             self.canvas.layer(name, self.moment, self.on()[name])
 
     def toggle(self) -> None:
-        """Play, or pause; from the start again when it is over."""
+        """Play, or pause; restart when it is over."""
         with self.lock:
             if self.playing:
                 return self.pause()
@@ -112,16 +112,16 @@ class Page:
             self.playing, self.button.label = True, "Pause"
 
     def pause(self) -> None:
-        """Stand still."""
+        """Stop playing."""
         self.playing, self.button.label = False, "Play"
 
     def step(self, ahead: int) -> None:
-        """To the next moment, or to the one before."""
+        """Go to the next moment, or to the previous one."""
         times = self.mission.log.time
         self.seek(float(times[int(np.clip(self.moment + ahead, 0, len(times) - 1))]))
 
     def play(self) -> None:
-        """Move on while playing; runs in a thread of its own."""
+        """Advance while playing; runs in its own thread."""
         before = clock.monotonic()
         while not self.closed:
             clock.sleep(1 / FRAMES_PER_SECOND)
@@ -132,7 +132,7 @@ class Page:
             before = now
 
     def seek(self, time: float) -> None:
-        """Show the mission as it was at a time [s]."""
+        """Show the mission at a time [s]."""
         with self.lock, self.server.atomic():
             log = self.mission.log
             self.time = min(max(time, 0.0), float(log.time[-1]))

@@ -14,14 +14,14 @@ ANY = "arena"  # label of the field for any number
 
 
 class Picker:
-    """Strategy and sweep point, where there are several, a list of missions worth a look, and any arena by number."""
+    """Strategy and sweep point, if there are several, a list of missions worth seeing, and any arena by number."""
 
     def __init__(self, gui: Any, missions: Missions, show: Callable[[Shown], None], at: Place | None = None):
         """
         Args:
           gui: of a viser server.
-          show: what to do with a mission that was chosen.
-          at: strategy, sweep point and arena of what is shown.
+          show: called with a mission that was chosen.
+          at: strategy, sweep point and arena of the mission shown.
         """
         self.missions, self.show, self.busy = missions, show, threading.Lock()
         strategy, point, arena = at or (missions.strategies[0], 0, 0)
@@ -42,7 +42,7 @@ class Picker:
         self.button.on_click(lambda _: self.open(int(self.number.value)))
 
     def labels(self) -> tuple[str, ...]:
-        """What the list offers; its first entry stands for an arena that was asked for by number."""
+        """The entries of the list; the first one stands for an arena chosen by number."""
         return (ANY, *(choice.label for choice in self.choices))
 
     def label(self, arena: int) -> str:
@@ -50,23 +50,23 @@ class Picker:
         return next((choice.label for choice in self.choices if choice.arena == arena), ANY)
 
     def relist(self) -> None:
-        """The missions of another strategy or point; the same arena is shown, so that they can be compared."""
+        """List the missions of another strategy or point; the same arena is shown, for comparison."""
         self.choices = self.missions.choices(self.strategy.value, self.at_point())
         self.list.options = self.labels()
         self.open(int(self.number.value))
 
     def pick(self) -> None:
-        """Open what was chosen in the list."""
+        """Open the mission chosen in the list."""
         for choice in self.choices:
             if choice.label == self.list.value:
                 self.open(choice.arena)
 
     def at_point(self) -> int:
-        """The sweep point that is chosen."""
+        """The chosen sweep point."""
         return self.missions.points.index(self.point.value)
 
     def open(self, arena: int) -> None:
-        """Open a mission and show it; says meanwhile that it is being played, or why it cannot be."""
+        """Open a mission and show it; meanwhile say that it is being played, or why it cannot be."""
         if not self.busy.acquire(blocking=False):
             return
         try:

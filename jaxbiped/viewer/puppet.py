@@ -1,4 +1,4 @@
-"""The simulated biped's MJCF as meshes, one a body, and where they are in a state."""
+"""The simulated biped's MJCF as meshes, one per body, and their poses in a state."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ EYE = "camera_left"  # site of the camera whose pictures are kept
 
 @dataclass(frozen=True)
 class Pose:
-    """Places and attitudes of some frames in the world."""
+    """Positions and attitudes of some frames in the world."""
 
     position: Float[np.ndarray, "K 3"]  # [m]
     wxyz: Float[np.ndarray, "K 4"]  # unit quaternions
 
 
 class Puppet:
-    """A biped that takes any posture, and weighs nothing."""
+    """A biped without dynamics that takes any posture."""
 
     def __init__(self, robot: RobotModelConfig):
         self.robot = robot
@@ -49,7 +49,7 @@ class Puppet:
         return tuple(tuple(parts) for parts in found)
 
     def poses(self, qpos: Float[np.ndarray, "19"]) -> tuple[Pose, Pose]:
-        """Where the bodies are in a state, and (a single one) the left camera, level: x ahead, z up."""
+        """Poses of the bodies in a state, and (a single one) of the left camera, level: x ahead, z up."""
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self.data)
         wxyz = np.empty(4)
@@ -58,7 +58,7 @@ class Puppet:
         return bodies, Pose(self.data.site_xpos[self.eye][None].copy(), wxyz[None])
 
     def home(self, x: float, y: float, z: float, yaw: float, squat: bool) -> Float[np.ndarray, "19"]:
-        """The state of standing or squatting still, feet about (x, y, z) [m], turned by `yaw` [rad]."""
+        """The state of standing or squatting still, feet around (x, y, z) [m], rotated by `yaw` [rad]."""
         table = home_table(self.robot, bool(squat))
         return self.carried(table.pelvis[-1], table.q[-1], (x, y, z, yaw))
 

@@ -1,4 +1,4 @@
-"""The server of the page: viser on a port that is free."""
+"""The server of the page: viser on a free port."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from jaxbiped.viewer.page import Page
 def serving(
     mission: Shown, host: str, port: int, missions: Missions | None = None, at: Place | None = None
 ) -> Iterator[Page]:
-    """The page, served by threads of its own while the block lasts. Arguments: see `Page`.
+    """Serve the page from other threads during the block. Arguments: see `Page`.
 
     Args:
-      host: address to listen to.
-      port: 0: any that is free.
+      host: address to listen on.
+      port: 0: any free one.
 
     Raises:
-      InputError: viser is not installed, the address is not of this machine, or the port is taken.
+      InputError: viser is not installed, the address is not of this machine, or the port is in use.
     """
     require()
     import viser
@@ -34,7 +34,7 @@ def serving(
     with quiet():
         server = viser.ViserServer(host=host, port=port, label="jaxbiped", verbose=False)
     try:
-        if port and server.get_port() != port:  # taken in between: viser goes on to the next one
+        if port and server.get_port() != port:  # taken in between: viser uses the next one
             raise taken(port)
         page = Page(server, mission, missions, at)
         yield page
@@ -45,7 +45,7 @@ def serving(
 
 
 def require() -> None:
-    """Raise `InputError` when viser is not installed."""
+    """Raise `InputError` if viser is not installed."""
     try:
         import viser  # noqa: F401
     except ImportError:
@@ -53,7 +53,7 @@ def require() -> None:
 
 
 def refuse_taken(host: str, port: int) -> None:
-    """Raise `InputError` unless a port can be listened to."""
+    """Raise `InputError` unless it is possible to listen on a port."""
     try:
         family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
     except (OSError, UnicodeError):
@@ -71,12 +71,12 @@ def refuse_taken(host: str, port: int) -> None:
 
 
 def taken(port: int) -> InputError:
-    """The error of a port that something else listens to."""
-    return InputError("is taken; choose another port, or 0 for any that is free", field="port", value=port)
+    """The error about a port that is in use."""
+    return InputError("is in use; choose another port, or 0 for any free one", field="port", value=port)
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Without what viser prints."""
+    """Suppress the output of viser."""
     with contextlib.redirect_stdout(io.StringIO()):
         yield

@@ -1,4 +1,4 @@
-"""What stands in an arena, as triangles: its floor, boxes, landmarks and goal, and how heights are coloured."""
+"""The content of an arena as triangles: its floor, boxes, landmarks and goal; also the colours of heights."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from jaxbiped.report.pictures import GOAL_RADIUS, INK
 
 Colour = tuple[int, int, int]
 
-FLOOR_DEPTH, RIM = 0.012, 0.015  # [m] of the floor's slab, and how far it reaches beyond the arena
-BELOW = 0.0015  # [m] that it lies lower, for what lies on it not to flicker
+FLOOR_DEPTH, RIM = 0.012, 0.015  # [m] depth of the floor's slab, and its margin around the arena
+BELOW = 0.0015  # [m] offset of the slab below the floor, to avoid flicker
 MARK_HEIGHT, RING_HEIGHT = 0.0045, 0.006  # [m]: above the tiles of the map
 RING_WIDTH, DASHES, SEGMENTS = 0.008, 16, 64
 FLOOR_COLOUR, MARKS = (120, 124, 132), {"circle": (226, 58, 46), "square": (28, 92, 230)}
 BOX_COLOURS = {"obstacle": (196, 92, 78), "bump": (116, 156, 205), "gate": (152, 118, 190)}
-TALL, THROUGH = 0.15, 0.5  # [m] height from which boxes are seen through, and their opacity
+TALL, THROUGH = 0.15, 0.5  # [m] height from which boxes are transparent, and their opacity
 LOWEST, HIGHEST = -0.03, 0.45  # [m] of the scale of heights
 
 
@@ -44,7 +44,7 @@ def rgb(colour: str) -> Colour:
 
 
 def solids(log: MissionLog) -> tuple[Solid, ...]:
-    """Everything of an arena that does not move."""
+    """Everything in an arena that does not move."""
     found = [floor(log)]
     found += [prism(f"arena/box_{k}", outline) for k, outline in enumerate(log.outlines)]
     for k, mark in enumerate(log.landmarks):
@@ -67,20 +67,20 @@ def floor(log: MissionLog) -> Solid:
 
 
 def prism(name: str, outline: Outline) -> Solid:
-    """A box of an arena. One that could hide the robot is drawn so that it is seen through."""
+    """A box of an arena. One that could hide the robot is drawn transparent."""
     top, bottom = max(outline.top, outline.bottom + 1e-3), outline.bottom
     corners = np.asarray(outline.corners_xy, float)
     vertices = np.concatenate([np.column_stack([corners, np.full(4, z)]) for z in (bottom, top)])
     sides = [[k, (k + 1) % 4, (k + 1) % 4 + 4, k + 4] for k in range(4)]
     quads = np.array([[3, 2, 1, 0], [4, 5, 6, 7], *sides])
-    separate = vertices[quads].reshape(-1, 3)  # corners that faces share would be shaded round
+    separate = vertices[quads].reshape(-1, 3)  # corners shared by faces would be shaded smoothly
     halves = np.array([[0, 1, 2], [0, 2, 3]])
     faces = (4 * np.arange(len(quads))[:, None, None] + halves).reshape(-1, 3)
     return Solid(name, separate, faces, BOX_COLOURS[outline.kind], THROUGH if top > TALL else 1.0)
 
 
 def goal(log: MissionLog) -> tuple[Solid, ...]:
-    """A cross, a broken circle within which the goal counts as reached, and a ring where the robot starts."""
+    """A cross, a dashed circle within which the goal counts as reached, and a ring at the robot's start."""
     x, y = (float(value) for value in log.goal_xy)
     parts = [arc(GOAL_RADIUS, 2 * math.pi * k / DASHES, 0.6 * 2 * math.pi / DASHES) for k in range(DASHES)]
     for angle in (math.pi / 4, -math.pi / 4):
@@ -95,7 +95,7 @@ def goal(log: MissionLog) -> tuple[Solid, ...]:
 
 
 def arc(radius: float, start: float, angle: float) -> trimesh.Trimesh:
-    """A flat strip along a circle about the origin, seen from above and from below."""
+    """A flat strip along a circle around the origin, visible from above and from below."""
     count = max(2, round(SEGMENTS * angle / (2 * math.pi))) + 1
     at = start + np.linspace(0, angle, count)
     ring = [np.column_stack([r * np.cos(at), r * np.sin(at), np.zeros(count)]) for r in (radius - RING_WIDTH, radius)]
@@ -105,7 +105,7 @@ def arc(radius: float, start: float, angle: float) -> trimesh.Trimesh:
 
 
 def solid(name: str, mesh: trimesh.Trimesh, colour: Colour, opacity: float = 1.0) -> Solid:
-    """A mesh of `trimesh`, each face with corners of its own, so that edges are sharp."""
+    """A mesh of `trimesh`, each face with its own corners, so that edges are sharp."""
     vertices = np.asarray(mesh.vertices)[mesh.faces].reshape(-1, 3)
     return Solid(name, vertices, np.arange(len(vertices)).reshape(-1, 3), colour, opacity)
 

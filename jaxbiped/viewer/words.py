@@ -1,4 +1,4 @@
-"""What the page says: the legend of its colours, and how far a mission is."""
+"""Texts of the page: the legend of its colours, and the progress of a mission."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ HEIGHTS = (0.0, 0.1, 0.2, 0.3, 0.4)  # [m] of the legend
 
 
 def status(log: MissionLog, t: int, time: float, arrived: float) -> str:
-    """Where a mission is at a time [s], in Markdown.
+    """The progress of a mission at a time [s], in Markdown.
 
     Args:
       t: its moment.
-      arrived: [s] when what is done after this moment will have been done; then it measures.
+      arrived: [s] when the action after this moment ends; then it measures.
     """
     last = len(log.time) - 1
     doing = caption(log, t) if t == last else log.action[t + 1] if time < arrived else "measuring"
@@ -31,7 +31,7 @@ def legend() -> str:
     """Colours and lines, in HTML."""
     rows = [(COLOURS[cell], cell.name.lower()) for cell in Cell if cell != Cell.UNMEASURED]
     rows = [row if row[1] != "bump" else (BUMP_SHADES[0], "bump (darker: 6 cm)") for row in rows]
-    rows += [("#ffffff", "unmeasured"), (PLAN, "plan"), (TRACK, "walked"), (BELIEF, "where it believes to be")]
+    rows += [("#ffffff", "unmeasured"), (PLAN, "plan"), (TRACK, "walked"), (BELIEF, "believed pose")]
     cells = "".join(
         f'<div style="display:flex;align-items:center;gap:.5em">'
         f'<span style="width:1.1em;height:1.1em;border-radius:3px;background:{colour};border:1px solid #8886"></span>'

@@ -30,7 +30,7 @@ def test_scenes_take_turns_and_stored_missions_are_played_again(tmp_path):
     mission = again.replay("full", 1)
     assert mission.code == rows["code"][1] and mission.distance == pytest.approx(rows["walked"][1], abs=1e-6)
     changed = {**again.config, "components": dict.fromkeys(again.config["components"], "0" * 12)}
-    with pytest.raises(jb.InputError, match="not what it was"):
+    with pytest.raises(jb.InputError, match="has changed since the study"):
         replace(again, config=changed).replay("full", 1)
 
 
@@ -59,7 +59,7 @@ def test_a_generator_is_a_family_among_others():
         (lambda: jb.RandomArenas([5]), "must be a function of a random key"),
         (lambda: jb.RandomArenas([lambda key: None]), "name of a family"),
         (lambda: jb.RandomArenas([jax.random.normal]), "must return an Arena"),
-        (lambda: jb.RandomArenas(["bump", "bump"]), "must be named once each"),
+        (lambda: jb.RandomArenas(["bump", "bump"]), "must be distinct"),
         (lambda: jb.RandomArenas(["bump"], count=0), "greater than or equal to 1"),
     ],
 )

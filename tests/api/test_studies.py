@@ -89,7 +89,7 @@ def test_results_are_stored_and_read_and_nothing_they_name_is_imported(results, 
     with pytest.raises(jb.InputError, match="exists"):
         results.save(tmp_path / "kept")
     other = jb.load(tmp_path / "kept", own=[jb.Strategy("plain_dijkstra", jb.HostPlanner(gives_up))])
-    with pytest.raises(jb.InputError, match="has other code"):
+    with pytest.raises(jb.InputError, match="has different code"):
         other.replay("plain_dijkstra", 0)
 
 
@@ -105,7 +105,7 @@ def test_missions_are_played_again_as_they_were(results):
 def test_strategies_of_one_name_and_of_no_kind_are_refused():
     for strategies, match in [
         (["full", jb.Strategy("full", jb.StraightLine())], "cannot have one name"),
-        ([plain_dijkstra, jb.Strategy("plain_dijkstra")], "must be named once each"),
+        ([plain_dijkstra, jb.Strategy("plain_dijkstra")], "must be distinct"),
         (["nobody"], "must be one of full, bump_aware"),
         ([5], "must be a Planner, not int"),
         ("full", "must be a list"),

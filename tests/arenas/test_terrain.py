@@ -279,8 +279,12 @@ def test_the_sampled_executor_knows_terrain(tmp_path):
         ("cell = 0.1", None, "scene.toml: terrain.cell: goes with pictures only, not with .npz"),
         ("range = [1.0, 0.0]", None, "scene.toml: terrain.range: must be LOW and HIGH [m], LOW below HIGH"),
         ("colour = 1", None, "scene.toml: terrain.colour: unknown key"),
-        ("origin = [2.0, 0.0]", None, "scene.toml: terrain.origin: must lay the terrain, 1.6 x 1.2 m, into the area"),
-        ("origin = [0.0, -1.5]", None, "terrain.origin: must lay the terrain"),
+        (
+            "origin = [2.0, 0.0]",
+            None,
+            "scene.toml: terrain.origin: must place the terrain, 1.6 x 1.2 m, inside the area",
+        ),
+        ("origin = [0.0, -1.5]", None, "terrain.origin: must place the terrain"),
         ("floor = 5.0", None, "scene.toml: start: must lie on terrain from -0.2 to 0.69 m; terrain.floor moves it"),
         ("", stairs() + 431.0, "start: must lie on terrain from -0.2 to 0.69 m"),
         ("", np.where(np.arange(161) < 30, np.nan, stairs()), "start: must not lie in a hole of the terrain"),
@@ -319,7 +323,7 @@ def test_what_does_not_know_terrain_refuses_it(tmp_path, capsys, options):
     path = scene(tmp_path)
     assert cli.main(["run", str(path), *options, "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert said.count("\n") == 1 and f"{options[0][2:]} {options[1]}: does not know terrain" in said
+    assert said.count("\n") == 1 and f"{options[0][2:]} {options[1]}: does not support terrain" in said
     assert not (tmp_path / "out").exists()
 
 

@@ -24,7 +24,7 @@ def said(capsys, *words) -> str:
 def test_an_empty_cache_is_shown_and_cleared(folder, capsys):
     for words in ((), ("--clear",), ()):
         text = said(capsys, *words)
-        assert f"{folder} (not there yet)" in text and "0 kernels" in text and "0 programs" in text
+        assert f"{folder} (does not exist yet)" in text and "0 kernels" in text and "0 programs" in text
     assert not folder.exists()
 
 
@@ -34,7 +34,7 @@ def test_what_is_kept_is_counted_and_cleared_and_no_other_file(folder, capsys):
         assert kept_files.write(folder / "programs" / "p" / f"jit_f-{k}", b"y\n", bytes(2000))
     (folder / "mine.txt").write_text("precious")
     text = said(capsys)
-    assert "3 kernels of Numba, 3.1 kB" in text and "3 programs of XLA, 6.1 kB, at most 500 MB" in text
+    assert "3 Numba kernels, 3.1 kB" in text and "3 XLA programs, 6.1 kB, at most 500 MB" in text
     assert said(capsys) == text  # looking changes nothing
     assert said(capsys, "--clear").endswith("cleared\n")
     assert sorted(path.name for path in folder.rglob("*")) == ["kernels", "mine.txt", "programs"]
@@ -49,8 +49,8 @@ def test_no_cache_at_all(monkeypatch, capsys):
 def test_places_that_are_no_folders_or_cannot_be_written_to(tmp_path, monkeypatch, capsys):
     (tmp_path / "file").write_text("mine")
     for place, what in (
-        (tmp_path / "file", "(no folder: nothing is kept)"),
-        (tmp_path / "file" / "below", "(cannot be written to: nothing is added)"),
+        (tmp_path / "file", "(not a folder: nothing is kept)"),
+        (tmp_path / "file" / "below", "(not writable: nothing is added)"),
         (tmp_path, "\n"),
     ):
         monkeypatch.setenv(VARIABLE, str(place))

@@ -75,7 +75,9 @@ def check(grid, away=(0.0, 0.0)):
 def test_a_room(tmp_path, capsys):
     check(run(tmp_path, ROOM))
     text = capsys.readouterr().out
-    assert f"{len(ROOM)} points\n" in text and "floor     found: z is up but for 0.0" in text and "dropped" not in text
+    assert (
+        f"{len(ROOM)} points\n" in text and "floor     found: z is up, tilted by 0.0" in text and "dropped" not in text
+    )
     files = ["classes.npz", "classify.json", "map.png", "voxels.npz", "voxels.png"]
     assert sorted(os.listdir(tmp_path / "out")) == files
     words = ["plan", str(tmp_path / "out" / "classes.npz"), "--start", "0.3", "0.3", "--goal", "1.8", "1.2"]
@@ -149,14 +151,14 @@ def test_nan_is_dropped_and_said(tmp_path, capsys):
     points = ROOM.copy()
     points[::10] = np.nan
     check(run(tmp_path, points))
-    assert f"; {len(points[::10])} that are NaN or infinite dropped" in capsys.readouterr().out
+    assert f"; {len(points[::10])} NaN or infinite points dropped" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("frame", ["-y", "y"])
 def test_other_frames_and_tilts(tmp_path, frame, capsys):
     turn = Rotation.from_euler("xy", [6, -4], degrees=True).as_matrix()
     run(tmp_path, (ROOM @ turn.T) @ FRAMES[frame])
-    assert f"found: {frame} is up but for 7.2" in capsys.readouterr().out
+    assert f"found: {frame} is up, tilted by 7.2" in capsys.readouterr().out
     said = json.loads((tmp_path / "out" / "classify.json").read_text())
     T = np.array(said["T_map_cloud"])
     points = (ROOM @ turn.T) @ FRAMES[frame] @ T[:3, :3].T + T[:3, 3]
@@ -178,7 +180,7 @@ def test_map_projections(tmp_path, given, capsys):
 
 def test_a_given_direction_and_millimetres(tmp_path, capsys):
     check(run(tmp_path, ROOM * 1000, scale=0.001, up=(0.0, 0.0, 2.0), tilt=0.0))
-    assert "but for 0.00 degrees" in capsys.readouterr().out
+    assert "tilted by 0.00 degrees" in capsys.readouterr().out
 
 
 def test_an_area_and_a_pitch(tmp_path):
@@ -201,9 +203,9 @@ def test_the_command_line(tmp_path, capsys):
 def test_what_is_refused(tmp_path):
     wall = np.random.default_rng(1).uniform((0, 0, 0), (3, 0.01, 2), (20_000, 3))
     text = refused(tmp_path, wall, up=(0.0, 0.0, 1.0))
-    assert "cloud.npz: shows no floor that could be found in its 3 x 0.01 x 2 m; give --floor (and --scale" in text
+    assert "cloud.npz: has no detectable floor in its 3 x 0.01 x 2 m; give --floor (and --scale" in text
     text = refused(tmp_path, np.random.default_rng(2).uniform(0, 1, (20_000, 3)))
-    assert "give --up X Y Z, and --floor where the floor is not in it" in text
+    assert "give --up X Y Z, and --floor if the floor is not in it" in text
     assert refused(tmp_path, np.zeros((0, 3))).endswith("cloud.npz: must hold finite points; it has none")
     assert refused(tmp_path, floor=0.1) == "floor: goes with --up only (got 0.1)"
     assert refused(tmp_path, up=(0.0, 0.0, 0.0)).startswith("up: must be a direction, not 0 0 0")
@@ -239,10 +241,10 @@ def test_a_larger_plane_outside_the_search_is_refused_with_up_named(tmp_path, ca
     """Of a table tilted by more than the search allows, no slanted cut through what stands on it is the floor."""
     points = tilted_table(38.0)
     text = refused(tmp_path, points, pitch=0.02)
-    assert "cloud.npz: shows a larger plane than the floor that was found, tilted by more than 30 degrees" in text
-    up = tuple(float(v) for v in re.search(r"give --up X Y Z \((\S+) (\S+) (\S+) where", text).groups())
+    assert "cloud.npz: shows a plane larger than the floor that was found and tilted by more than 30 degrees" in text
+    up = tuple(float(v) for v in re.search(r"give --up X Y Z \((\S+) (\S+) (\S+) if", text).groups())
     run(tmp_path, points, pitch=0.02, up=up)
-    assert "y is up but for 38.0" in capsys.readouterr().out
+    assert "y is up, tilted by 38.0" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("degrees", [33.0, 50.0])
@@ -252,11 +254,11 @@ def test_other_tilts_beyond_the_search_name_up_as_well(tmp_path, degrees):
 
 def test_a_tilt_within_the_search_needs_no_up(tmp_path, capsys):
     run(tmp_path, tilted_table(25.0), pitch=0.02)
-    assert "found: y is up but for 24.9" in capsys.readouterr().out
+    assert "found: y is up, tilted by 24.9" in capsys.readouterr().out
 
 
 def test_one_point_is_no_floor(tmp_path):
-    assert "no floor" in refused(tmp_path, np.zeros((1, 3)))
+    assert "no detectable floor" in refused(tmp_path, np.zeros((1, 3)))
 
 
 # The peak of a child's own memory, as the kernel has it for what it runs: what `resource` says of a child begins with

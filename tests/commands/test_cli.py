@@ -38,8 +38,11 @@ def refused(capsys, *argv: str) -> str:
     [
         (["walk"], ["must be one of " + ", ".join(cli.COMMANDS), "walk"]),
         (["run"], ["PATH: must be given; `jaxbiped run --help-all` lists"]),
-        (["run", SCENE, "--strateg", "full"], ["--strateg: is no option of jaxbiped run; did you mean --strategy?"]),
-        (["run", SCENE, "again", "3"], ["again: is one word too many; `jaxbiped run --help-all` lists"]),
+        (
+            ["run", SCENE, "--strateg", "full"],
+            ["--strateg: is not an option of jaxbiped run; did you mean --strategy?"],
+        ),
+        (["run", SCENE, "again", "3"], ["again: is an unexpected argument; `jaxbiped run --help-all` lists"]),
         (
             ["run", SCENE, "--executor", "feet"],
             ["--executor: must be one of kinematic, sampled, native, mjx", "or package.module:name", "(got 'feet')"],
@@ -51,7 +54,7 @@ def refused(capsys, *argv: str) -> str:
         (["classify", "a.ply", "--pitch", "nan"], ["--pitch: must be a finite number (got nan)"]),
         (["compare", "--families"], ["--families: must have at least 1 item (got ())"]),
         (["sweep", "--no-such"], ["options: cannot be used; `jaxbiped sweep --help-all` lists", "--no-such"]),
-        (["run", SCENE, "--speed", "3"], ["--speed: is no option of jaxbiped run; did you mean --seed?"]),
+        (["run", SCENE, "--speed", "3"], ["--speed: is not an option of jaxbiped run; did you mean --seed?"]),
         (["run", SCENE, "--strategy", "brave"], ["--strategy", "brave", "floor_only"]),
         (["run", SCENE, "--costs.c1", "-4"], ["--costs.c1", "greater than or equal to 0", "-4"]),
         (["run", SCENE, "--costs.c1", "nan"], ["--costs.c1", "finite", "nan"]),
@@ -67,7 +70,7 @@ def refused(capsys, *argv: str) -> str:
         (["compare", "missing.toml"], ["missing.toml", "no such file"]),
         (["compare", "--arenas", "0"], ["--arenas", "greater than or equal to 1"]),
         (["compare", "--pitch", "0.03"], ["pitch", "must divide", "0.03"]),
-        (["compare", "--strategies", "full", "full"], ["named once"]),
+        (["compare", "--strategies", "full", "full"], ["must be distinct"]),
         (["compare", "--sensor", "lidar"], ["--sensor", "lidar", "raycast"]),
         (["compare", "--executor", "robot"], ["--executor", "robot", "kinematic"]),
         (["compare", "--planner", "lattice"], ["--planner", "lattice", "heading"]),
@@ -75,7 +78,7 @@ def refused(capsys, *argv: str) -> str:
         (["compare", "--until-width", "0"], ["--until-width", "greater than 0"]),
         (["compare", "--until-width", "2"], ["until-width", "below 2 for success", "2.0"]),
         (["compare", "--until-width", "0.1", "--first", "brave"], ["first:", "brave", "floor_only"]),
-        (["compare", "--strategies", "full", "--until-width", "0.1"], ["first", "needs another"]),
+        (["compare", "--strategies", "full", "--until-width", "0.1"], ["first", "at least two"]),
         (
             ["compare", "--strategies", "full", "floor_only", "--until-width", "1", "--second", "blind_stop"],
             ["second", "blind_stop"],

@@ -108,7 +108,8 @@ def test_an_area_is_cut_out(tmp_path):
 def test_what_is_too_high_to_stand_on_is_said_to_be_walls(tmp_path, capsys):
     grid = run(tmp_path, saved(tmp_path), *PICTURE)
     assert (
-        "walls     41.0% of the heights lie over 0.705 m above the floor, and count as walls" in capsys.readouterr().out
+        "walls     41.0% of the heights lie more than 0.705 m above the floor, and count as walls"
+        in capsys.readouterr().out
     )
     assert (grid.classes[-10:] == X).all()
 
@@ -133,7 +134,7 @@ def test_goes_on_to_plan(tmp_path):
         ((*PICTURE, "--area", "1", "0", "0", "1"), "area: must be X0 < X1 and Y0 < Y1"),
         (
             (*PICTURE, "--scale", "1000"),
-            "pitch: must give at most 4,000,000 cells on 4000 x 2400 m; a larger --pitch does",
+            "pitch: must give at most 4,000,000 cells on 4000 x 2400 m; choose a larger --pitch",
         ),
     ],
 )

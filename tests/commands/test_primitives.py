@@ -127,9 +127,9 @@ def test_the_shipped_library_is_whole():
     ("change", "said"),
     [
         (("falls = 0", "falls = 9999"), "falls, slips and touches"),
-        (("[primitives.turn]", "[primitives.spin]"), "missions play turn too"),
+        (("[primitives.turn]", "[primitives.spin]"), "missions also play turn"),
         (("trials =", "tries ="), "trials"),
-        (("yaw = [", "yaw = [9.9, "), "stands must have a row"),
+        (("yaw = [", "yaw = [9.9, "), "stands must have one row"),
     ],
 )
 def test_a_library_that_cannot_be_right(tmp_path, change, said):

@@ -39,7 +39,7 @@ def test_a_results_folder_is_none_of_scenes(tmp_path):
 
 def test_a_file_among_them_that_is_none_is_named(tmp_path):
     for other in (STUDY, str(tmp_path / "no.toml"), str(tmp_path)):
-        with pytest.raises(InputError, match="is no scene, as the others are"):
+        with pytest.raises(InputError, match="is not a scene like the others"):
             with_scenes([TWO[0], other])
     broken = tmp_path / "broken.toml"
     broken.write_text("start = [")

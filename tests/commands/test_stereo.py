@@ -154,7 +154,7 @@ def test_a_pose_in_the_camera_file(pair, tmp_path, capsys):
     assert run(tmp_path, *pair, camera, out=tmp_path / "other") == 0
     said = json.loads((tmp_path / "other" / "stereo.json").read_text())
     assert (said["pitch_degrees"], said["height"]) == (pytest.approx(30), 1.0) and not said["floor_found"]
-    assert "pose      of the camera file, for no floor was found" in capsys.readouterr().out
+    assert "pose      from the camera file, as no floor was found" in capsys.readouterr().out
 
 
 def cropped(pair, tmp_path, rows):
@@ -173,9 +173,7 @@ def test_few_matches_and_a_leaning_floor_are_warned_of(capsys):
     assert capsys.readouterr() == ("", "")
     stereo.warn(0.199, math.radians(-20.1))
     first, second = capsys.readouterr().err.splitlines()
-    assert first.startswith(
-        "jaxbiped: warning: only 19.9% of the pixels match, below 20%: the map may be of little worth"
-    )
+    assert first.startswith("jaxbiped: warning: only 19.9% of the pixels match, below 20%: the map may be unreliable")
     assert second.startswith(
         "jaxbiped: warning: the floor that was found is rolled by -20 degrees, above 20: it may be"
     )
@@ -202,7 +200,7 @@ def test_no_floor_in_view(pair, tmp_path):
     """The upper third of the picture: wall, shelves and handlebars."""
     paths = cropped(pair, tmp_path, slice(0, 160))
     text = refused(tmp_path, *paths, with_changes(tmp_path, height=160))
-    assert text.startswith(f"{paths[0]}: shows no floor that could be found; give pitch and height of the camera")
+    assert text.startswith(f"{paths[0]}: shows no detectable floor; give pitch and height of the camera")
 
 
 def test_grey_and_16_bit_pictures_give_the_same_map(mapped, pair, tmp_path):
@@ -234,7 +232,7 @@ def test_what_is_refused(pair, tmp_path):
     Image.new("L", (741, 500)).save(tmp_path / "black.png")
     assert "is blank: every pixel is 0" in refused(tmp_path, left, tmp_path / "black.png")
     (tmp_path / "cut.png").write_bytes(left.read_bytes()[:9000])
-    assert "is no picture, or is damaged" in refused(tmp_path, tmp_path / "cut.png", right)
+    assert "is not a picture, or is damaged" in refused(tmp_path, tmp_path / "cut.png", right)
     assert "must show something within 0.5 m" in refused(tmp_path, left, right, max_range=0.5)
     assert "right: must have" not in refused(tmp_path, left, left)  # one picture twice matches at 0 px, infinitely far
     (tmp_path / "out").mkdir()

@@ -49,7 +49,7 @@ def test_two_folders(here, capsys):
     stored(here / "longer", arenas=90)
     assert cli.main(["compare", "r", "longer", "--first", "full", "--second", "full", *FEW]) == 0
     printed = capsys.readouterr().out
-    assert "full (r) - full (longer)" in printed and "30 arenas that one side has" in printed
+    assert "full (r) - full (longer)" in printed and "30 arenas that only one side has" in printed
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_two_folders(here, capsys):
         (["r", "--first", "brave"], ["first:", "brave", "floor_only"]),
         (["r", "--first", "blind_stop"], ["r: first", "must be one of full, bump_aware, floor_only", "blind_stop"]),
         (["r", "--first", "full", "--second", "full"], ["must differ from the first side"]),
-        (["r", "--second-point", "1"], ["r: second-point", "there is one point, 0"]),
+        (["r", "--second-point", "1"], ["r: second-point", "must be 0, the only point"]),
         (["swept", "--first-point", "3"], ["first-point", "0 to 2"]),
         (["swept", "--first-point", "-1"], ["--first-point", "greater than or equal to 0"]),
         (["r", "--margin-success", "0"], ["--margin-success", "greater than 0"]),
@@ -73,7 +73,7 @@ def test_two_folders(here, capsys):
         (["r", "--plan-power", "--wanted-difference", "2"], ["wanted-difference", "below 1"]),
         (["r", "--power", "1"], ["--power", "less than 1"]),
         (["r", "--level", "95"], ["--level", "less than 1"]),
-        (["r", "--arenas", "10"], ["--arenas: is no option"]),
+        (["r", "--arenas", "10"], ["--arenas: is not an option"]),
         (["r", "--out", "swept"], ["out", "does not exist yet", "swept"]),
     ],
 )

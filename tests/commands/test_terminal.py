@@ -78,7 +78,7 @@ def test_terminals_that_can_show_little(tmp_path, environment):
     )
     assert done.returncode == 2 and (tmp_path / "out").is_dir() and (tmp_path / "help").stat().st_size > 200
     last = done.stderr.decode().splitlines()[-1].removeprefix("\x1b[?25h")  # shows the cursor again, after the bar
-    assert last.startswith("jaxbiped: ") and "--walk: is no option" in last and "\x1b" not in last
+    assert last.startswith("jaxbiped: ") and "--walk: is not an option" in last and "\x1b" not in last
     if "ascii" in environment.values() or "C" in environment.values():
         assert b'1 x 2 - 3 +- 4 deg -> "5"' in done.stdout
 
@@ -150,7 +150,7 @@ def test_compare_into_the_folder_of_a_stopped_study_says_resume(tmp_path, monkey
     manifest = tmp_path / "cut" / "manifest.json"
     manifest.write_text(manifest.read_text().replace('"finished"', '"stopped"'))
     assert cli.main(["compare", "--arenas", "6", "--out", "cut"]) == 2
-    assert "--resume goes on with it" in capsys.readouterr().err
+    assert "--resume continues" in capsys.readouterr().err
     manifest.write_text(manifest.read_text().replace('"stopped"', '"finished"'))
     assert cli.main(["compare", "--arenas", "6", "--out", "cut"]) == 2
     assert "must be a folder that does not exist yet" in capsys.readouterr().err

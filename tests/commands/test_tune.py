@@ -100,7 +100,7 @@ def test_costs_from_durations(here, capsys):
         (["--low", "5", "--high", "2"], ["high must be above low"]),
         (["--executor", "native"], ["kinematic or sampled"]),
         (["--pitch", "0.03"], ["pitch", "must divide", "0.03"]),
-        (["--families", "bump", "bump"], ["named once"]),
+        (["--families", "bump", "bump"], ["must be distinct"]),
         (["--from-durations", "guess"], ["--from-durations", "guess", "library"]),
         (["--from-durations", "table", "--durations.straight", "0"], ["durations.straight", "above 0"]),
         (["--durations.straight", "0", "--durations.measure", "0"], ["durations.straight", "above 0"]),

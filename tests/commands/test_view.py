@@ -93,7 +93,7 @@ def damage(folder, how):
 @pytest.mark.parametrize(
     ("how", "said"),
     [
-        ("cut", ["mission.npz", "is no log of a mission, or a damaged one"]),
+        ("cut", ["mission.npz", "is not the log of a mission, or is damaged"]),
         ("format", ["mission.npz: format", "reads logs of format 1", "got 7"]),
         ("config", ["mission.npz", "written by another version", "speed", "unknown key"]),
         ("empty", ["has nothing to show", "mission.npz", "manifest.json"]),

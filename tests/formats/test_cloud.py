@@ -91,8 +91,8 @@ PCD = "VERSION 0.7\nFIELDS {}\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEI
     ("name", "content", "words"),
     [
         ("c.ply", "", "is empty"),
-        ("c.ply", "solid cube", "is no PLY file"),
-        ("c.ply", "ply\nformat ascii 1.0\n", "is no PLY file, or was cut short: its header does not end"),
+        ("c.ply", "solid cube", "is not a PLY file"),
+        ("c.ply", "ply\nformat ascii 1.0\n", "is not a PLY file, or is cut short: its header does not end"),
         (
             "c.ply",
             EMPTY.replace("float z", "quad z"),
@@ -108,22 +108,22 @@ PCD = "VERSION 0.7\nFIELDS {}\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEI
             EMPTY.replace("ascii", "text"),
             r"format: must be one of ascii, binary_little_endian, .* \(got 'text'\)",
         ),
-        ("c.ply", EMPTY.replace("vertex 0", "vertex 2") + "1 2 3\n", "was cut short: it holds 1 of 2 points"),
-        ("c.ply", EMPTY.replace("vertex 0", "vertex 1") + "1 2 three\n", "what follows its header must be numbers"),
+        ("c.ply", EMPTY.replace("vertex 0", "vertex 2") + "1 2 3\n", "is cut short: it holds 1 of 2 points"),
+        ("c.ply", EMPTY.replace("vertex 0", "vertex 1") + "1 2 three\n", "its header must be followed by numbers"),
         ("c.ply", EMPTY, "must hold finite points; it has none"),
-        ("c.pcd", "hello", "is no PCD file, or was cut short: its header must end with DATA"),
+        ("c.pcd", "hello", "is not a PCD file, or is cut short: its header must end with DATA"),
         ("c.pcd", PCD.format("x y z").replace("SIZE 4", "SIZE 2"), "x: TYPE F and SIZE 2 are not supported"),
         ("c.pcd", PCD.format("x y z").replace("POINTS 1", "POINTS 2"), "POINTS: must be WIDTH times HEIGHT, 1 x 1"),
         (
             "c.pcd",
             PCD.format("x y z").replace("COUNT 1 1 1", "COUNT 1 1"),
-            "COUNT: must say something of each of the 3",
+            "COUNT: must have a value for each of the 3",
         ),
-        ("c.pcd", PCD.format("x y z").replace("1 2 3", "1 2"), "was cut short: it holds 0 of 1 points"),
+        ("c.pcd", PCD.format("x y z").replace("1 2 3", "1 2"), "is cut short: it holds 0 of 1 points"),
         ("c.pcd", PCD.format("x y z").replace("ascii", "lz4"), "DATA: must be one of ascii, binary, binary_compressed"),
         ("c.pcd", PCD.format("x y i"), "must have the fields x, y and z; it has x, y, i"),
-        ("c.npz", "PK", "is no .npz, or was cut short"),
-        ("c.npy", "hello", "is no .npy point cloud, or is damaged"),
+        ("c.npz", "PK", "is not an .npz, or is cut short"),
+        ("c.npy", "hello", "is not a .npy point cloud, or is damaged"),
         ("c.las", "LASF", r"cloud: must be one of .npz, .npy, .ply, .pcd \(got '.las'\)"),
     ],
 )
@@ -202,7 +202,7 @@ def test_pcd_headers_as_the_point_cloud_library_reads_them(tmp_path, header, for
         np.testing.assert_allclose(load(path).points, POINTS[:count], atol=1e-6)
     if form != "ascii":
         path.write_bytes(pcd(POINTS, form, *HEADERS[header], padded=padded)[:-1])
-        with pytest.raises(InputError, match="was cut short"):
+        with pytest.raises(InputError, match="is cut short"):
             load(path)
 
 
@@ -240,7 +240,7 @@ def test_ply_files_with_lists_and_other_elements(tmp_path, form, lists):
             np.testing.assert_allclose(load(path).points, POINTS, atol=1e-6)
     for cut in (5, 3000):
         path.write_bytes(ply(form, lists)[:-cut])
-        with pytest.raises(InputError, match=r"was cut short: it holds \d+ of \d+ (points|records of face)"):
+        with pytest.raises(InputError, match=r"is cut short: it holds \d+ of \d+ (points|records of face)"):
             load(path)
 
 
@@ -263,7 +263,7 @@ def test_a_textured_mesh_keeps_all_its_vertices(tmp_path):
         ({"points": np.zeros((0, 3))}, "must hold finite points; it has none"),
         ({"points": np.full((4, 3), np.nan)}, "must hold finite points; all 4 are NaN or infinite"),
         ({"cells": POINTS}, r"must hold points \[N, 3\], or x, y and z \[N\]; it holds cells"),
-        ({"x": np.zeros(3), "y": np.zeros(3), "z": np.zeros(4)}, "is no .npz, or was cut short|same shape"),
+        ({"x": np.zeros(3), "y": np.zeros(3), "z": np.zeros(4)}, "is not an .npz, or is cut short|same shape"),
         ({"points": np.array([object()] * 3)}, "pickled"),
     ],
 )

@@ -193,7 +193,7 @@ def test_maps_that_are_none_are_refused(tmp_path):
         (np.ones((2, 2, 2)), "heights: must be an array [P, Q]"),
         (np.array([["a", "b"], ["c", "d"]]), "heights: must be real numbers"),
         (np.ones((2, 2), complex), "heights: must be real numbers"),
-        (np.array([[None, 1], [2, 3]]), "pickled objects, which are refused"),
+        (np.array([[None, 1], [2, 3]]), "pickled objects, which are rejected"),
     ):
         assert said in refused(tmp_path, "a.npz", npz(heights=heights, pitch=0.1)), said
     clear = np.dstack([GREY] * 3 + [np.zeros_like(GREY)])
@@ -282,7 +282,7 @@ def test_files_that_are_none(tmp_path):
     assert "must be a PNG or TIFF picture" in refused(tmp_path, "a.png", picture(GREY, "JPEG"), **PIXELS)
     single = io.BytesIO()
     np.save(single, HEIGHTS)
-    assert "is no .npz, or was cut short" in refused(tmp_path, "a.npz", single.getvalue())
+    assert "is not an .npz, or is cut short" in refused(tmp_path, "a.npz", single.getvalue())
 
 
 WHOLE = {

@@ -140,7 +140,7 @@ BAD_SCENARIOS = [
     (SCEN.replace("5.41421356", "long"), ": line 2: must hold bucket, map"),
     (
         SCEN.replace("\t7\t2\t", "\t8\t2\t"),
-        ": line 2: must be of a map as wide and high as this one, 7 x 2 (got '8 x 2')",
+        ": line 2: must be for a map of the size of this one, 7 x 2 (got '8 x 2')",
     ),
     (SCEN.replace("\t6\t1\t", "\t7\t1\t"), ": line 2: position must lie on the map, 7 x 2 (got (7, 1))"),
     (SCEN.replace("\t1\t0\t", "\t1\t-1\t"), ": line 2: position must lie on the map, 7 x 2 (got (1, -1))"),

@@ -123,7 +123,7 @@ def test_deep_and_turned_pictures_are_named(write, tmp_path):
     (tmp_path / "deep.png").write_bytes(cv2.imencode(".png", deep)[1].tobytes())
     (tmp_path / "deep.pgm").write_bytes(b"P5 2 1 65535\n1234")
     for name in ("deep.png", "deep.pgm"):
-        assert "must have 8 bits a pixel" in refused(write(None, name)), name
+        assert "must have 8 bits per pixel" in refused(write(None, name)), name
     exif = Image.Exif()
     exif[0x0112] = 6
     Image.fromarray(RAMP).save(tmp_path / "turned.png", exif=exif)
@@ -179,15 +179,15 @@ def test_sheets_that_are_no_yaml(tmp_path):
 def test_a_picture_without_its_sheet(tmp_path):
     Image.fromarray(RAMP).save(tmp_path / "p.png")
     path = tmp_path / "p.png"
-    assert refused(path) == f"{path}: is no map: the map_server file p.yaml must lie beside it"
+    assert refused(path) == f"{path}: is not a map: the map_server file p.yaml must be beside it"
     assert refused(tmp_path / "q.png") == f"{tmp_path / 'q.png'}: no such file"
 
 
 def test_pictures_that_are_no_maps(write, tmp_path):
     path = tmp_path / "m.png"
     photo = np.random.default_rng(0).integers(0, 256, (20, 30, 3), dtype=np.uint8)
-    assert refused(write(photo)) == f"{path}: must be a grey map, and this picture is in colour"
-    assert refused(write(RAMP.astype(np.uint16) * 256)).startswith(f"{path}: must have 8 bits a pixel")
+    assert refused(write(photo)) == f"{path}: must be a grey map, but this picture is in colour"
+    assert refused(write(RAMP.astype(np.uint16) * 256)).startswith(f"{path}: must have 8 bits per pixel")
     assert refused(write(b"these are words, not pixels")) == f"{path}: must be a PNG or PGM picture"
     assert refused(write(b"")) == f"{path}: must be a PNG or PGM picture"
     Image.fromarray(photo).save(tmp_path / "m.jpg")

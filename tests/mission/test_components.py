@@ -32,8 +32,8 @@ def component(base, **methods):
     [
         (5, "must be \\(value, valid\\)"),
         ((ZERO,), "must be \\(value, valid\\)"),
-        ((jnp.zeros(3), NO), r"float32\[3\], bool\[\] where one number and one truth value"),
-        ((ZERO, ZERO), "one truth value"),
+        ((jnp.zeros(3), NO), r"float32\[3\], bool\[\] where one number and one boolean"),
+        ((ZERO, ZERO), "one boolean"),
         ((NO, NO), "one number"),
     ],
 )
@@ -76,8 +76,8 @@ def test_components_that_are_none_are_named():
         names: list = field(default_factory=list, metadata={"static": True})
 
     for thing, base, match in [
-        (Plain(), jb.Metric, "is no pytree"),
-        (NoPytree(), jb.Sensor, "is no pytree"),
+        (Plain(), jb.Metric, "is not a pytree"),
+        (NoPytree(), jb.Sensor, "is not a pytree"),
         (WithText(), jb.Executor, "holds a str"),
         (Unhashable(), jb.Metric, "cannot be hashed"),
         (3, jb.Sensor, "must be a Sensor, not int"),

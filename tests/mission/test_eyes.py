@@ -70,7 +70,7 @@ def test_eyes_that_cannot_be_opened_end_all_missions(first_look):
 
 def test_loop_does_not_stand_in_for_a_sensor_on_the_host(first_look):
     static = replace(PROGRAM, sensor="stereo")
-    with pytest.raises(ValueError, match="given what they see"):
+    with pytest.raises(ValueError, match="given their views"):
         jax.eval_shape(partial(step, program=static), *first_look)
 
 

@@ -40,4 +40,4 @@ def test_facts_are_json():
 )
 def test_the_sentence_depends_on_what_was_seen(changes, said):
     log = replace(off(), **changes)
-    assert pose_sentence(log) == f"pose 3.0 cm and 11.5° from the truth at the end, 5.0 cm at most{said}"
+    assert pose_sentence(log) == f"pose error 3.0 cm and 11.5° at the end, 5.0 cm at most{said}"

@@ -103,7 +103,9 @@ def damaged(tmp_path, how):
 @pytest.mark.parametrize("how", ["cut", "other", "array", "format", "missing", "short"])
 def test_what_is_no_log_is_refused(tmp_path, how):
     path = damaged(tmp_path, how)
-    said = {"format": "reads logs of format 1 (got 99)", "missing": "damaged", "short": "damaged"}.get(how, "is no log")
+    said = {"format": "reads logs of format 1 (got 99)", "missing": "damaged", "short": "damaged"}.get(
+        how, "is not the log"
+    )
     with pytest.raises(InputError, match=r"m\.npz") as caught:
         load_log(path)
     assert said in str(caught.value)

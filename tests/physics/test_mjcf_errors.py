@@ -12,7 +12,7 @@ BODY = "<mujoco>\n<worldbody>\n{}\n</worldbody>\n</mujoco>"
     "xml, said",
     [
         ("<mujoco>\n<foo/>\n</mujoco>", "line 2, foo: unrecognized element"),
-        ("<mujoco><worldbody", "line 1: is no well-formed XML"),
+        ("<mujoco><worldbody", "line 1: is not well-formed XML"),
         ("", "empty file 'model_.xml'"),
         (BODY.format("<body name='a'><joint/></body>"), "line 3, a: mass and inertia of moving bodies"),
         (BODY.format("<geom size='-1'/>"), "line 3: size 0 must be positive in geom"),

@@ -90,7 +90,7 @@ def test_warp_that_is_not_installed():
 def test_options_of_mjx():
     with pytest.raises(InputError, match="impl: must be 'jax' or 'warp'"):
         physics.make("mjx", PENDULUM, 1, impl="cpp")
-    with pytest.raises(InputError, match="threads: unknown option; there are block, contacts, device"):
+    with pytest.raises(InputError, match="threads: unknown option; known ones are block, contacts, device"):
         physics.make("mjx", PENDULUM, 1, threads=1)
 
 

@@ -157,7 +157,7 @@ def test_work_is_not_told_where_it_is_not_asked_for_or_not_known():
     batch = physics.make("native", PENDULUM, 2, work=True)
     state = batch.advance(np.array([[[1e12]] * 300, [[0.1]] * 300]))
     assert np.isnan(state.work[0]).all() and state.work[1] > 0 and state.valid.tolist() == [False, True]
-    with pytest.raises(InputError, match="work: sensors are added to MJCF"):
+    with pytest.raises(InputError, match="work: sensors can be added to MJCF"):
         physics.make("native", mujoco.MjModel.from_xml_string(PENDULUM), 1, work=True)
 
 

@@ -53,7 +53,7 @@ def test_missions_that_end_otherwise_are_named(origins, monkeypatch):
     fell = Mission(Code.FELL, 0.5, 60.0, 3, (), mission())
     monkeypatch.setattr(room, "play_again", lambda *origin: [fell] * len(origin[-1]))
     section = example_section(FRAME, PAIR, origins, 1)
-    assert "Played again here, these differ: full on arena" in section.text[1] and "reached when" in section.text[1]
+    assert "Replayed here, these differ: full on arena" in section.text[1] and "reached when" in section.text[1]
 
 
 def test_what_cannot_be_played_is_said(origins, monkeypatch):

@@ -147,7 +147,7 @@ def test_points_that_are_damaged_are_named(tmp_path):
         with pytest.raises(InputError, match=rf"points.parquet: {said}"):
             read_points(folder)
     pl.DataFrame({"point": [0, 2], "costs.c3": [1.0, 2.0]}).write_parquet(folder / "points.parquet")
-    with pytest.raises(InputError, match=r"points.parquet: must hold `point`, rising from 0"):
+    with pytest.raises(InputError, match=r"points.parquet: must hold `point`, ascending from 0"):
         read_points(folder)
 
 

@@ -15,7 +15,7 @@ PAIR = compare(rows(30, strategies=("full", "floor_only")), resamples=20).pair("
 UP, DOWN, OPEN = Estimate(0.2, 0.1, 0.3), Estimate(-0.2, -0.3, -0.1), Estimate(0.01, -0.1, 0.1)
 NONE = Estimate(0.0)
 ZERO = "At 1 the interval includes zero."
-TOO_FEW = "At 1 too few arenas were solved, or all are alike, so that there is no interval."
+TOO_FEW = "At 1 there is no interval: too few arenas were solved, or all are alike."
 
 
 def lead(c3):

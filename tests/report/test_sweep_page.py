@@ -93,7 +93,7 @@ def test_the_point_in_full_is_the_configs_own_or_the_one_that_is_named(tmp_path)
 def test_one_strategy_has_rates_alone(tmp_path):
     folder = swept(tmp_path / "s", Config(axes=(C3,)), LINE, strategies=("full",))
     read = Reader(write_sweep_page(write_sweep_report(folder, resamples=20), resamples=20).read_text())
-    assert "How does full fare against costs.c3?" in read.text
+    assert "How does full depend on costs.c3?" in read.text
 
 
 def test_one_function_reports_on_comparisons_and_on_sweeps(tmp_path):

@@ -137,7 +137,7 @@ def test_reasons_are_only_given_where_figures_differ():
     assert distance_reason(near, a_record(5, 10.5, 0.87), 0.91) is None
     said = distance_reason(EXPERIMENTS[3], a_record(4, 14.3, 1.57), 1.41)
     assert "157 cm is 24 cm more than the paper's 133" in said
-    assert "+8 cm of the difference is our layout" in said and "+16 cm came on the way" in said
+    assert "+8 cm of the difference is due to our layout" in said and "+16 cm arose on the way" in said
 
 
 def test_how_missions_ended_is_counted():

@@ -77,7 +77,7 @@ def test_the_paper_camera():
         (NoiseConfig, {"correlation": 0.6}, "correlation"),
         (NoiseConfig, {"max_range": "far"}, "max_range"),
         (NoiseConfig, {"stretch_kept": 0.5}, "stretch_lost must be above stretch_kept"),
-        (NoiseConfig, {"stretch_kept": 0.5, "stretch_lost": 0.5}, "or both left out"),
+        (NoiseConfig, {"stretch_kept": 0.5, "stretch_lost": 0.5}, "or both omitted"),
         (NoiseConfig, {"stretch_kept": -1, "stretch_lost": 1}, "stretch_kept"),
         (SensorConfig, {"landmarks": {"nearest": -1}}, "landmarks.nearest"),
         (SensorConfig, {"rays": {"columns": 2, "rows": 48}}, "rays.columns"),

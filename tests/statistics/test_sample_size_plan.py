@@ -49,7 +49,7 @@ def test_a_pilot_without_discordance_plans_with_the_wanted_difference():
     same = [FRAME.filter(pl.col("strategy") == "full").with_columns(strategy=pl.lit(name)) for name in ("a", "b")]
     made = plan(pl.concat(same), "a", "b", "success", 0.05)
     assert made.spread == 0 and made.arenas > 100 and made.arenas_high >= made.arenas
-    with pytest.raises(InputError, match="not all alike"):
+    with pytest.raises(InputError, match="not all equal"):
         plan(pl.concat(same), "a", "b", "time", 5.0)
 
 

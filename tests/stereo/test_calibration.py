@@ -107,7 +107,7 @@ FOREIGN_LENSES = [
 def test_other_lenses_in_an_opencv_file(tmp_path, line, key):
     """D of a fisheye has four numbers, too: what tells it is its name or its flag."""
     text = opencv_file(tmp_path / "rig.yml", [-0.2, 0.001, 0.0]).read_text()
-    with pytest.raises(InputError, match=rf"fish.yml: {key}: (must be one of pinhole|is of an omnidirectional lens)"):
+    with pytest.raises(InputError, match=rf"fish.yml: {key}: (must be one of pinhole|is for an omnidirectional lens)"):
         load_rig(written(tmp_path, text + line + "\n", "fish.yml"), SHAPE)
     pinhole = "fisheye_model: 0\ncamera_model: pinhole\nmodel: D435\ncalibration_time: today\n"
     assert load_rig(written(tmp_path, text + pinhole, "pinhole.yml"), SHAPE).camera.size == SHAPE
@@ -216,7 +216,7 @@ def test_missing_values_are_named(tmp_path):
         ("calib.txt", MIDDLEBURY.replace("193.001", "wide"), "must hold finite numbers"),
         ("calib.txt", MIDDLEBURY.replace("; 0 0 1]", "]"), r"cam0: must be a matrix \[3, 3\]"),
         ("calib.txt", MIDDLEBURY.replace("193.001", "193001"), "baseline"),
-        ("rig.yaml", "%YAML:1.0\n---\nfoo: [", "is no OpenCV calibration"),
+        ("rig.yaml", "%YAML:1.0\n---\nfoo: [", "is not an OpenCV calibration"),
         ("rig.yaml", "hello", "OpenCV calibration"),
         ("rig.xml", "", "OpenCV calibration"),
     ],

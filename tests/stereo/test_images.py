@@ -106,7 +106,7 @@ def test_ten_bits_in_sixteen_are_kept_in_every_kind_of_file(tmp_path, scene, kin
         paths.append(tmp_path / f"{name}.any")
         paths[-1].write_bytes(DEEP_FILES[kind](deep))
     if kind not in ("png", "ppm") and number == 2:
-        with pytest.raises(InputError, match=r"not supported(: TIFF of \d+ bits a sample with such channels)?$"):
+        with pytest.raises(InputError, match=r"not supported(: TIFF of \d+ bits per sample with such channels)?$"):
             load_pair(*paths)
         return
     for got, image in zip(load_pair(*paths), scene, strict=False):
@@ -223,7 +223,7 @@ def test_damaged_pictures(tmp_path, scene, damage, capfd):
         left.unlink()
         if damage == "folder":
             left.mkdir()
-    words = {"none": "no such file", "folder": "is a directory"}.get(damage, "is no picture, or is damaged")
+    words = {"none": "no such file", "folder": "is a directory"}.get(damage, "is not a picture, or is damaged")
     with pytest.raises(InputError, match=words) as caught:
         load_pair(left, right)
     assert str(caught.value).startswith(f"{left}: left: ") and "\n" not in str(caught.value)
@@ -246,7 +246,7 @@ def test_swapped_pictures_are_found(scene, synthetic):
 
 def test_pictures_that_are_no_pair(scene):
     other = ramp(10.0, 0.0, 0.1, seed=9)[1]
-    with pytest.raises(InputError, match="of the pixels match: the pictures are no rectified pair"):
+    with pytest.raises(InputError, match="of the pixels match: the pictures are not a rectified pair"):
         check_order(scene[0], other, PARAMS)
     with pytest.raises(InputError, match="of the pixels match"):
         check_order(scene[0], scene[1][::-1].copy(), PARAMS)

@@ -79,5 +79,5 @@ def test_a_robot_camera():
 
 
 def test_the_image_must_be_the_cameras():
-    with pytest.raises(InputError, match=r"image: must be 741 x 500 px, as the camera says \(got '3 x 2'\)"):
+    with pytest.raises(InputError, match=r"image: must be 741 x 500 px, as in the camera file \(got '3 x 2'\)"):
         to_points(Disparity(np.ones((2, 3), np.float32), np.ones((2, 3), bool)), CAMERA)

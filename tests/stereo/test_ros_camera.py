@@ -155,7 +155,7 @@ def test_no_model_has_no_coefficients(tmp_path, model):
     for camera in files.values():
         camera["distortion_model"] = model
     with pytest.raises(
-        InputError, match="distortion_model: must be named, for the coefficients of distortion are not 0"
+        InputError, match="distortion_model: must be named, since the coefficients of distortion are not 0"
     ):
         load_rig(written(tmp_path, files), (1, 1))
     for camera in files.values():

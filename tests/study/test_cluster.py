@@ -207,7 +207,7 @@ def test_scheduler_and_workers_that_vanish(monkeypatch, begun, tmp_path):
                 Cluster(client)
             worker = start_worker(address)
             client.wait_for_workers(1, timeout=60)
-            with pytest.raises(InputError, match=r"scheduler: is gone; .* --resume goes on with it"):
+            with pytest.raises(InputError, match=r"scheduler: is gone; .* --resume continues the study"):
                 conduct(tmp_path / "r", CONFIG, resume=True, engine=then(lambda: end(running)))
     finally:
         end(worker, running)
@@ -226,7 +226,7 @@ def installed(folder, name, version):
 def test_worker_of_another_version(scheduler, begun, tmp_path):
     """Refused before anything runs; one that joins later, with its first shard."""
     other = installed(tmp_path / "old", "jaxbiped", "0.0.9")
-    refused = r"worker tcp://127.0.0.1:\d+: has jaxbiped 0.0.9 \(here .*\); all workers must have what the client has"
+    refused = r"worker tcp://127.0.0.1:\d+: has jaxbiped 0.0.9 \(here .*\); all workers must have the client's versions"
     workers = [start_worker(scheduler)]
     try:
         with connect(scheduler) as client:
@@ -251,8 +251,8 @@ def test_worker_of_another_version(scheduler, begun, tmp_path):
         ("127.0.0.1:99999", "must be the address of a Dask scheduler"),
         ("http://127.0.0.1:80", "must be the address of a Dask scheduler"),
         ("tcp://127.0.0.1:{closed}", "no Dask scheduler answers there: connection refused"),
-        ("tcp://127.0.0.1:{silent}", "no Dask scheduler answers there: what listens there is none"),
-        ("127.0.0.1:{rude}", "no Dask scheduler answers there: what listens there is none"),
+        ("tcp://127.0.0.1:{silent}", "no Dask scheduler answers there: the listening program is not one"),
+        ("127.0.0.1:{rude}", "no Dask scheduler answers there: the listening program is not one"),
     ],
 )
 def test_scheduler_that_is_not_there(address, message, capsys, monkeypatch, tmp_path):
@@ -281,7 +281,7 @@ def test_scheduler_that_is_not_there(address, message, capsys, monkeypatch, tmp_
 def test_options_that_do_not_go_together(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["compare", "--workers", "2", "--scheduler", "tcp://127.0.0.1:1"]) == 2
-    assert "workers: goes with no --scheduler" in capsys.readouterr().err
+    assert "workers: does not go with --scheduler" in capsys.readouterr().err
     assert cli.main(["compare", "--workers", "0"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     monkeypatch.setitem(sys.modules, "distributed", None)

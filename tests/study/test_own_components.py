@@ -103,7 +103,7 @@ def test_workers_are_not_given_what_they_cannot_find():
 
     refuse_own(StudyConfig())
     FAMILIES.add("hills", Family("hills", jnp.sin), replace=True)
-    with pytest.raises(InputError, match="is registered in this process alone"):
+    with pytest.raises(InputError, match="is registered in this process only"):
         refuse_own(StudyConfig(families=("bump", "hills")))
 
 
@@ -124,7 +124,7 @@ def test_names_that_are_taken_or_cannot_be_shown_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"\.toml: name of a family"):
         scene_family(path)
     FAMILIES.add("hills", Family("hills", jnp.sin), replace=True)
-    with pytest.raises(InputError, match="goes with families that are built in only"):
+    with pytest.raises(InputError, match="can only be combined with built-in families"):
         families_of(StudyConfig(families=("traffic", "hills")))
 
 
@@ -134,7 +134,7 @@ def test_routes_that_are_none_and_states_that_change_are_named():
     with pytest.raises(InputError, match="Lab: plan must return a Route"):
         check_route(jnp.zeros((3, 1)), given, "Lab")
     for state in (None, jnp.zeros((3, 2)), jnp.zeros(3, jnp.int32)):
-        with pytest.raises(InputError, match="Lab: a route's state must be as initial_state says"):
+        with pytest.raises(InputError, match="Lab: a route's state must be like that of initial_state"):
             check_route(Route(jnp.zeros((3, 1), jnp.int8), state=state), given, "Lab")
 
 

@@ -133,7 +133,7 @@ def test_without_resume_a_stopped_study_is_refused(stopped):
 
 
 def test_a_new_study_where_one_was_stopped_is_told_to_resume(stopped, whole, tmp_path):
-    with pytest.raises(InputError, match=r"out: holds a study that is not finished: --resume goes on with it"):
+    with pytest.raises(InputError, match=r"out: holds an unfinished study: --resume continues it"):
         refuse_taken(stopped)
     with pytest.raises(InputError, match="must be a folder that does not exist yet"):
         refuse_taken(whole)
@@ -186,7 +186,7 @@ def test_damaged_shard_is_named_and_can_be_removed(stopped, whole, damage):
         pl.read_parquet(path).drop("code").write_parquet(path)
     else:
         path.write_bytes({"cut": data[: len(data) // 2], "garbage": b"not parquet" * 9, "empty": b""}[damage])
-    refused(stopped, r"part-00002.parquet: .*remove .*, and it is computed again")
+    refused(stopped, r"part-00002.parquet: .*remove .* to have it computed again")
     path.unlink()
     conduct_here(stopped, resume=True)
     assert_same_study(stopped, whole)
@@ -195,7 +195,7 @@ def test_damaged_shard_is_named_and_can_be_removed(stopped, whole, damage):
 def test_shard_of_another_study_is_named(stopped):
     path = stopped / "rows" / "part-00000.parquet"
     path.rename(path.with_name("part-00010.parquet"))
-    refused(stopped, r"part-00010.parquet: is no shard of this study, which has 10")
+    refused(stopped, r"part-00010.parquet: is not a shard of this study, which has 10")
 
 
 def test_two_runs_into_one_folder_are_refused(stopped):

@@ -45,7 +45,7 @@ def test_it_ends_at_the_first_look_that_is_tight_enough(tmp_path):
         assert not one_less(TABLE.filter(pl.col("arena") // 40 == k))
     (sentence,) = stopping_sentences(tmp_path / "r")
     assert f"Stopped after {kept.arenas} of at most 480 arenas and {kept.looks} looks" in sentence
-    assert f"{480 - kept.arenas} arenas were left out" in sentence and "where 25 was asked for" in sentence
+    assert f"{480 - kept.arenas} arenas were left out" in sentence and "where 25 was requested" in sentence
     report = write_report(tmp_path / "r", resamples=20)
     assert report.remarks == (sentence,)
     assert "confidence sequence" in (tmp_path / "r" / "summary.md").read_text()

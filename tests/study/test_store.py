@@ -79,7 +79,7 @@ def test_shards_are_numbered_and_missing_ones_show(tmp_path):
         assert results.append(FRAME.slice(5, 5), shard=7).name == "part-00007.parquet"
         assert results.append(FRAME.slice(10, 5)).name == "part-00008.parquet"
         assert results.done() == {0, 7, 8}
-        with pytest.raises(InputError, match=r"part-00007.parquet: this shard is written already"):
+        with pytest.raises(InputError, match=r"part-00007.parquet: this shard is already written"):
             results.append(FRAME.slice(15, 5), shard=7)
 
 

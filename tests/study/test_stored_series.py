@@ -110,13 +110,13 @@ def test_only_one_strategy_has_no_second(tmp_path):
 def test_other_arenas_are_refused_with_the_difference(tmp_path):
     folder = open_stored(stored(tmp_path / "a"))
     seeded = open_stored(stored(tmp_path / "b", seed=7))
-    with pytest.raises(InputError, match=r"seeds differ, so the arenas do: 0 in .*a, 7 here"):
+    with pytest.raises(InputError, match=r"seeds differ, and so do the arenas: 0 in .*a, 7 here"):
         side_by_side(*choose([folder, seeded]))
     moved = open_stored(stored(tmp_path / "c", change=lambda frame: frame.with_columns(family=pl.lit("bump"))))
     with pytest.raises(InputError, match=r"families differ: arena 0 is obstacles of difficulty 0\.\d+ in .*a, bump"):
         side_by_side(*choose([folder, moved]))
     apart = open_stored(stored(tmp_path / "d", change=lambda frame: frame.with_columns(pl.col("arena") + 1000)))
-    with pytest.raises(InputError, match="has no arena that"):
+    with pytest.raises(InputError, match="has no arena in common with"):
         side_by_side(*choose([folder, apart]))
 
 

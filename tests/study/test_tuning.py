@@ -116,7 +116,7 @@ def test_objective_of_missions():
     ("options", "said"),
     [
         ({"low": 5.0, "high": 5.0}, "high must be above low"),
-        ({"families": ("bump", "bump")}, "named once"),
+        ({"families": ("bump", "bump")}, "must be distinct"),
         ({"strategy": "blind_stop"}, "full"),
         ({"mission": {"executor": "native"}}, "kinematic or sampled"),
         ({"steps": 0}, "greater than or equal to 1"),

@@ -318,7 +318,7 @@ def test_playing_goes_on_to_the_end_and_stops(page):
 
 
 def test_a_taken_port_and_a_foreign_host_are_named(page):
-    with pytest.raises(InputError, match="port: is taken"), serving(shown(), "127.0.0.1", page.server.get_port()):
+    with pytest.raises(InputError, match="port: is in use"), serving(shown(), "127.0.0.1", page.server.get_port()):
         pass
     with (
         pytest.raises(InputError, match="host: must be an address of this machine"),

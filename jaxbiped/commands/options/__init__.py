@@ -1,1 +1,1 @@
-"""The options of each command: light to import, so that help and wrong options are answered at once."""
+"""The options of each command: quick to import, so that help and wrong options are answered at once."""

@@ -6,10 +6,10 @@ from jaxbiped.commands.options.base import Options
 
 
 class CacheArgs(Options):
-    """Show what is kept on disk so that programs start sooner: machine code of kernels, and XLA's executables.
+    """Show what is kept on disk so that programs start sooner: machine code of kernels, and XLA executables.
 
-    It lies in the user's cache folder, or where JAXBIPED_CACHE says; JAXBIPED_CACHE=off keeps nothing.
+    It is in the user's cache folder, or where JAXBIPED_CACHE says; with JAXBIPED_CACHE=off nothing is kept.
     """
 
     clear: bool = False
-    """Remove all of it."""
+    """Remove everything."""

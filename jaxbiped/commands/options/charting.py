@@ -23,12 +23,12 @@ class ChartArgs(RobotFileOptions):
     pitch: float = Field(0.05, ge=0.005, le=10.0)
     """[m] Side of a cell."""
     area: Area = None
-    """[m] What to map. Default: what the points cover."""
+    """[m] Area to map. Default: the area of the points."""
     robot: RobotConfig = RobotConfig()
-    """The robot that the map is for."""
+    """The robot that the map is made for."""
     map: ChartConfig = SCAN
     """Thresholds of the map."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
-    """Of the search for the floor."""
+    """Seed of the search for the floor."""
     out: Folder = None
     """Folder to write, which must not exist. Default: results/<command>-<hash of these options>."""

@@ -25,21 +25,21 @@ class ClassifyArgs(ChartArgs):
     """The cloud, .npz (points [N, 3], or x, y, z), .npy, .ply or .pcd. The elevation map, .npz (heights [P, Q] and
     pitch, metres), .png or .tif (grey), or .asc (Esri)."""
     heightmap: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """The file is an elevation map. Its levels are steps of the robot, and holes in it are unmeasured."""
+    """The file is an elevation map. Levels are steps of the robot, and holes are unmeasured."""
     cell: Annotated[Annotated[float, Field(gt=0, le=1e6)] | None, tyro.conf.arg(metavar="FLOAT")] = None
-    """[m] A pixel of an elevation map that is a picture."""
+    """[m] Size of a pixel, if the elevation map is a picture."""
     range: Pair = None
-    """[m] Heights of the darkest and the brightest value there can be in such a picture."""
+    """[m] Heights of the darkest and the brightest possible value in such a picture."""
     hole: Annotated[float | None, tyro.conf.arg(metavar="FLOAT")] = None
-    """Value of pixels of such a picture that were not measured."""
+    """Value of unmeasured pixels in such a picture."""
     scale: Annotated[float, Field(gt=0, le=1e4)] = 1.0
-    """[m] One unit of the cloud; 0.001 for millimetres. Of an elevation map the factor of all three axes, which brings
+    """[m] One unit of the cloud; 0.001 for millimetres. For an elevation map, the factor of all three axes, to scale
     a building to the robot's size."""
     up: Vector = None
-    """The direction against gravity in the cloud's frame. Default: found, z or else y or -y within 30 degrees. Must be
-    given where a larger plane than that floor is tilted by more."""
+    """The direction opposite to gravity in the cloud's frame. Default: the normal of the floor that is found within 30
+    degrees of z, else of y or -y. Required if a plane larger than that floor is tilted by more."""
     tilt: Annotated[float, Field(ge=0, le=60)] = 10.0
-    """[deg] by which --up may be off; 0 to take it as it is."""
+    """[deg] Possible error of --up; 0 to take it as given."""
     floor: Annotated[Metres | None, tyro.conf.arg(metavar="FLOAT")] = None
-    """[m] Height of the floor along --up, which is then taken as it is. With --heightmap, height of level 0, after
-    --scale. Default: found."""
+    """[m] Height of the floor along --up, both taken as given. With --heightmap, height of level 0, after --scale.
+    Default: found."""

@@ -17,9 +17,9 @@ from jaxbiped.study.config import StudyConfig
 class CompareArgs(EngineArgs, RobotFileOptions, CameraFileOptions, StudyConfig):
     """Compare strategies on the same random arenas, with paired statistics.
 
-    A study in TOML may come first; options override it. Scenes in its place, or a folder of them, are the arenas:
-    jaxbiped compare configs/scenes/*.toml. A results folder, or two, are compared without running again: see
-    `jaxbiped compare FOLDER --help`.
+    A study in TOML may come first; options override it. Scenes, or a folder of them, given instead are used as the
+    arenas: jaxbiped compare configs/scenes/*.toml. One or two results folders are compared without running anything
+    again: see `jaxbiped compare FOLDER --help`.
     """
 
     BASIC: ClassVar[tuple[str, ...]] = (
@@ -31,12 +31,12 @@ class CompareArgs(EngineArgs, RobotFileOptions, CameraFileOptions, StudyConfig):
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/compare-<hash of the study>."""
     resume: bool = False
-    """Go on with the study in the folder where it was stopped, or begin it."""
+    """Resume the study in the folder where it stopped, or start it."""
     until_width: Annotated[float, pydantic.Field(gt=0.0)] | None = None
-    """[fraction, m or s] Stop after the shard that brings the interval of a difference to this width; it holds at every
-    look. `--arenas` is then the most, `--shard` how many between looks."""
+    """[fraction, m or s] Stop after the shard that narrows the interval of a difference to this width; the interval
+    holds at every look. `--arenas` is then the maximum, `--shard` the number between looks."""
     measure: Literal[MEASURES] = "success"
-    """Whose difference `--until-width` is about."""
+    """The measure whose difference `--until-width` refers to."""
     first: str | None = None
     """Of that difference: first minus second; by default the pair that the report is about."""
     second: str | None = None

@@ -1,4 +1,4 @@
-"""Where the shards of a study are computed: options that commands share."""
+"""Where the shards of a study are computed: options shared by several commands."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ class EngineArgs(Options):
     scheduler: str | None = None
     """Address of a Dask scheduler, such as tcp://host:8786: its workers compute the shards. Needs jaxbiped[cluster]."""
     workers: Annotated[int, pydantic.Field(ge=1, le=1024)] | None = None
-    """The same by this many worker processes on this machine, among which its cores are shared out."""
+    """The same, with this many worker processes on this machine; its cores are divided among them."""

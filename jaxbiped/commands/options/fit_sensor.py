@@ -11,18 +11,18 @@ from jaxbiped.commands.options.base import Options
 
 
 class FitSensorArgs(Options):
-    """Render arenas, watch the matcher and the landmarks, fit the noise of the ray-cast sensor to what is seen, and
-    say how close the two sensors come on other arenas. The file that is written goes with --preset."""
+    """Render arenas, evaluate the matcher and the landmark detector, fit the noise of the ray-cast sensor to them, and
+    report how well the two sensors agree on other arenas. Use the file that is written with --preset."""
 
     camera: Path | None = None
     """A camera file (TOML); default: the paper's camera."""
     arenas: Annotated[int, pydantic.Field(ge=1, le=1000)] = 12
-    """Random arenas that are fitted to, all families in turn; as many others are for comparison."""
+    """Random arenas for the fit, from all families in turn; as many others are used for the comparison."""
     views: Annotated[int, pydantic.Field(ge=1, le=1000)] = 10
-    """Places in each, aimed at gates, bumps and obstacles."""
+    """Views of each arena, aimed at gates, bumps and obstacles."""
     missions: Annotated[int, pydantic.Field(ge=0, le=1000)] = 12
-    """Of both sensors, on the arenas for comparison."""
+    """Missions of both sensors, on the arenas of the comparison."""
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 1
-    """Of the arenas, the places and all noise."""
+    """Seed of the arenas, the views and all noise."""
     out: Path | None = None
     """Sensor file to write, which must not exist. Default: results/fit-sensor-<hash of these options>.toml"""

@@ -23,30 +23,30 @@ class PlanArgs(Options):
     file: tyro.conf.Positional[Path]
     """The map: FILE.map, FILE.yaml (or its picture), or FILE.npz."""
     start: Position = None
-    """X Y [m] in the map's frame; for a Moving AI map column and row [cells] from the upper left."""
+    """X Y [m] in the map's frame; for a Moving AI map, column and row [cells] from the upper left."""
     goal: Position = None
     """X Y, as for --start."""
     scenario: Name = None
-    """A Moving AI scenario (.scen): check each of its optimal lengths, in place of --start and --goal."""
+    """A Moving AI scenario (.scen): check each of its optimal lengths, instead of --start and --goal."""
     sample: Annotated[int | None, Field(ge=1), tyro.conf.arg(metavar="INT")] = None
     """Check only this many queries of the scenario, evenly spread. Default: all."""
     c0: Annotated[float, Field(ge=1e-3, le=1e6)] = PAPER.c0
-    """Cost of distance, for 5 cm. All costs are the paper's, and scaled to the map's cells."""
+    """Cost of distance, per 5 cm. All costs are the paper's, scaled to the map's cells."""
     c1: Cost = PAPER.c1
-    """Cost of walking on one level, for 5 cm."""
+    """Cost of walking on one level, per 5 cm."""
     c2: Cost = PAPER.c2
-    """Cost of a gate, for 5 cm."""
+    """Cost of a gate, per 5 cm."""
     c3: Cost = PAPER.c3
     """Cost of one step up or down."""
     c4: Cost = PAPER.c4
-    """Cost of what is unmeasured, for 5 cm."""
+    """Cost of an unmeasured cell, per 5 cm."""
     corner_cutting: bool = False
     """Allow diagonal moves past one blocked cell."""
     radius: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """[m] Grow obstacles by this much, for a disc of a robot on a map of plain occupancy."""
+    """[m] Grow obstacles by this much, for a disc-shaped robot on a plain occupancy map."""
     robot: Name = None
-    """A robot's TOML file, whose radius is taken for --radius."""
+    """A robot's TOML file, whose radius is used as --radius."""
     pitch: Annotated[float, Field(gt=0.0, le=1000.0)] = 0.05
-    """[m] Side of a cell of a Moving AI map, whose file does not say."""
+    """[m] Side of a cell of a Moving AI map, since its file does not say."""
     out: Name = None
     """Folder to write, which must not exist. Default: results/plan-<hash of these options>."""

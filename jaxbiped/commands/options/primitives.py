@@ -16,7 +16,7 @@ Name = Literal[tuple(PAPER)]
 
 class PrimitivesArgs(Options):
     """Generate the motion primitives and verify them in simulation: undisturbed, on a mild and a hard set of
-    disturbances, and with each disturbance by itself. Write tables, the library that `--executor sampled` reads, and
+    disturbances, and with each disturbance alone. Write tables, the library that `--executor sampled` reads, and
     videos.
     """
 
@@ -30,23 +30,23 @@ class PrimitivesArgs(Options):
     only: Annotated[tuple[Name, ...], pydantic.Field(min_length=1)] = tuple(PAPER)
     """Which primitives."""
     draws: Annotated[int, pydantic.Field(ge=1, le=100_000)] = 128
-    """Trials of each set."""
+    """Trials in each set."""
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Of the disturbances: the first draws of a larger set are the same."""
+    """Seed of the disturbances; the first ones are the same in a larger set."""
     backend: Literal["native", "mjx", "auto"] = "native"
-    """Who steps: MuJoCo on the CPU's threads, or MJX."""
+    """What steps the simulation: MuJoCo on CPU threads, or MJX."""
     device: Literal["cpu", "gpu", "tpu"] | None = None
-    """Where MJX steps; by default where JAX does."""
+    """Device of MJX; by default that of JAX."""
     robot: Path | None = None
     """Robot model, a TOML file such as configs/robots/enuvo_walk_model.toml; its values are the defaults."""
     bump: Annotated[float, pydantic.Field(gt=0.0, le=1.0)] = 0.03
-    """[m] height of the bump that is stepped over."""
+    """[m] Height of the bump to step over."""
     gate: Annotated[float, pydantic.Field(gt=0.0, le=10.0)] = 0.37
-    """[m] under the lintel of the gate that is passed."""
+    """[m] Clear height of the gate to pass."""
     videos: bool = True
     """Write a video of each primitive, played undisturbed."""
     against: Literal["mjx"] | None = None
-    """Write nothing, and print how far this backend is from `native`: at every moment of each primitive, and in the
-    outcomes of 64 steps up of which about a third fails. Exit status 1 when it is more than 1 mm or one differs."""
+    """Write nothing, and print how much this backend differs from `native`: at every moment of each primitive, and in
+    the outcomes of 64 steps up of which about a third fails. Exit status 1 if by more than 1 mm, or in any outcome."""
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/primitives."""

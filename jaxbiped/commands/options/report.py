@@ -12,11 +12,11 @@ from jaxbiped.commands.options.base import Options
 
 
 class ReportArgs(Options):
-    """Write report.html, summary.md and the figures of a results folder anew, and print its tables."""
+    """Rewrite report.html, summary.md and the figures of a results folder, and print its tables."""
 
     folder: tyro.conf.Positional[Path]
     """A folder that `jaxbiped compare` or `jaxbiped sweep` wrote."""
     point: Annotated[int, pydantic.Field(ge=0)] | None = None
-    """Of a sweep: the point at which strategies are compared in full; by default that with the config's own values."""
+    """For a sweep: the point at which strategies are compared in full; by default that with the config's own values."""
     examples: Annotated[int, pydantic.Field(ge=0, le=50)] = 3
-    """Arenas where the two strategies differ most, to be played again and drawn; that compiles a mission. 0: none."""
+    """Arenas where the two strategies differ most, to replay and draw; this compiles a mission. 0: none."""

@@ -15,7 +15,7 @@ from jaxbiped.study.config import StrategyName
 
 
 class RunArgs(RobotFileOptions, CameraFileOptions):
-    """Run one mission in a scene: print what the robot plays, and write pictures of its map."""
+    """Run one mission in a scene: print the primitives that the robot plays, and write pictures of its map."""
 
     BASIC: ClassVar[tuple[str, ...]] = (
         *("scene", "strategy", "seed", "mission.sensor", "mission.preset", "mission.executor"),
@@ -26,9 +26,9 @@ class RunArgs(RobotFileOptions, CameraFileOptions):
     scene: tyro.conf.Positional[Path]
     """The scene, a TOML file; the paper's six are in configs/scenes."""
     strategy: StrategyName = "full"
-    """What the robot plans its way by, and what it dares."""
+    """What the robot plans with, and what it may cross."""
     seed: Annotated[int, pydantic.Field(ge=0, lt=2**32)] = 0
-    """Of all noise."""
+    """Seed of all noise."""
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/run-<scene>-<strategy>-<hash of these options>."""
     mission: Annotated[MissionConfig, tyro.conf.arg(name="")] = MissionConfig()

@@ -23,14 +23,14 @@ class StereoArgs(ChartArgs):
     left: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LEFT")]
     """The picture of the left camera: PNG, JPEG, TIFF, PGM, ...; grey or colour, 8 or 16 bits."""
     right: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="RIGHT")]
-    """That of the right camera."""
+    """The picture of the right camera."""
     camera: Annotated[Path, tyro.conf.arg(metavar="FILE")]
     """Calibration: .toml, .yaml of OpenCV or of ROS (left.yaml beside right.yaml), .xml, or Middlebury's calib.txt."""
     max_range: Annotated[float | None, Field(gt=0, le=1000), tyro.conf.arg(metavar="FLOAT")] = None
-    """[m] Drop what is further off. Default: where depth is as uncertain as at 2 m in the paper's camera."""
+    """[m] Drop points farther away. Default: where depth is as uncertain as at 2 m with the paper's camera."""
     num_disparities: Annotated[int | None, Field(ge=16, le=2048, multiple_of=16), tyro.conf.arg(metavar="INT")] = None
-    """[px] Search range. Default: the camera file's, else --match's."""
+    """[px] Search range. Default: that of the camera file, else of --match."""
     match: MatchParams = MatchParams()
-    """Numbers of the matcher."""
+    """Parameters of the matcher."""
     map: ChartConfig = ONE_LOOK
     """Thresholds of the map."""

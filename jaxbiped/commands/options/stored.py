@@ -23,7 +23,7 @@ class StoredArgs(Options):
     )
 
     folders: tyro.conf.Positional[Annotated[tuple[Path, ...], pydantic.Field(min_length=1, max_length=2)]]
-    """One results folder, or two on the same arenas: the first side is then of the first."""
+    """One results folder, or two on the same arenas: then the first side is from the first folder."""
     first: str | None = None
     """Strategy of the first side. Differences are first minus second."""
     second: str | None = None
@@ -32,20 +32,20 @@ class StoredArgs(Options):
     second_point: Annotated[int, pydantic.Field(ge=0)] | None = None
     """Default: that of the first side."""
     level: Share = 0.95
-    """Of the intervals."""
+    """Confidence level of the intervals."""
     resamples: Annotated[int, pydantic.Field(ge=10, le=1_000_000)] = 4999
-    """Of the bootstraps."""
+    """Seed of the bootstraps."""
     margin_success: Share | None = None
-    """Test whether success differs by less than this fraction."""
+    """Test whether success rates differ by less than this fraction."""
     margin_distance: Amount | None = None
     """[m] The same for distance."""
     margin_time: Amount | None = None
     """[s] The same for time."""
     plan_power: bool = False
-    """Say how many arenas would show `--wanted-difference`, taking these results for a pilot."""
+    """Report how many arenas would show `--wanted-difference`, taking these results as a pilot."""
     wanted_difference: Amount | None = None
-    """[fraction, m or s] In `--measure`."""
+    """[fraction, m or s] The difference to show, in units of `--measure`."""
     measure: Literal["success", "distance", "time"] = "success"
     power: Share = 0.8
     out: Path | None = None
-    """Folder to write the tables and a page into, which must not exist; by default nothing is written."""
+    """Folder to write the tables and a page to, which must not exist; by default nothing is written."""

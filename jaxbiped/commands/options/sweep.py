@@ -26,4 +26,4 @@ class SweepArgs(EngineArgs, RobotFileOptions, CameraFileOptions, SweepConfig):
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/sweep-<hash of the sweep>."""
     resume: bool = False
-    """Go on with the sweep in the folder where it was stopped, or begin it."""
+    """Resume the sweep in the folder where it stopped, or start it."""

@@ -12,10 +12,10 @@ from jaxbiped.study.tuning_config import TuneConfig
 
 
 class TuneArgs(RobotFileOptions, CameraFileOptions, TuneConfig):
-    """Tune the costs C1 to C4 on random arenas, and judge them on others.
+    """Tune the costs C1 to C4 on random arenas, and evaluate them on others.
 
-    The planner takes the same paths when all costs double, so that C0 stays as it is. A TOML file may come first and
-    give the defaults.
+    C0 stays fixed, since the planner takes the same paths if all costs double. A TOML file may come first and give the
+    defaults.
     """
 
     BASIC: ClassVar[tuple[str, ...]] = (
@@ -26,7 +26,7 @@ class TuneArgs(RobotFileOptions, CameraFileOptions, TuneConfig):
     NOTES: ClassVar[str] = strategy_notes(tuple(name for name in STRATEGIES if name != "blind_stop"), own=False)
 
     from_durations: Literal["table", "library"] | None = None
-    """Play no mission, and fit C0 to C3 to how long the primitives take: `table` for `durations`, by default Table 2 of
-    the paper, `library` for what simulation measured."""
+    """Run no missions; fit C0 to C3 to the durations of the primitives: `table` for `durations`, by default Table 2 of
+    the paper, `library` for durations measured in simulation."""
     out: Path | None = None
     """Folder to write, which must not exist. Default: results/tune-<hash of the config>."""

@@ -12,22 +12,22 @@ from jaxbiped.commands.options.base import Options
 
 
 class ViewArgs(Options):
-    """Show missions in the browser: arena, robot, points, maps, plan and pictures, at any time of them."""
+    """Show missions in the browser: arena, robot, points, maps, plan and pictures, at any time of the mission."""
 
     result: tyro.conf.Positional[Path]
-    """A folder that `jaxbiped run`, `compare`, `sweep` or `reproduce` wrote. Of a study, missions are played again."""
+    """A folder written by `jaxbiped run`, `compare`, `sweep` or `reproduce`. Missions of a study are played again."""
     port: Annotated[int, pydantic.Field(ge=0, le=65535)] = 8080
-    """To serve the page on; 0: any that is free."""
+    """Port to serve the page on; 0: any free one."""
     host: str = "127.0.0.1"
-    """Address to listen to; 0.0.0.0 lets other machines look, too."""
+    """Address to listen on; 0.0.0.0 lets other machines connect."""
     strategy: str | None = None
-    """Of a study: whose mission to begin with; by default the first there is."""
+    """Of a study: the strategy to start with; by default the first one."""
     arena: Annotated[int, pydantic.Field(ge=0)] | None = None
-    """Of a study: the arena to begin with; by default that of the median time. Of a folder with several recorded
-    missions: their number."""
+    """Of a study: the arena to start with; by default that of the median time. Of a folder with several recorded
+    missions: the number of the mission."""
     point: Annotated[int, pydantic.Field(ge=0)] | None = None
-    """Of a sweep: the point to begin with; default 0."""
+    """Of a sweep: the point to start with; default 0."""
     browser: bool = True
     """Open the page in the browser."""
     once: bool = False
-    """End when the page is there, without waiting for Ctrl-C."""
+    """Exit when the page is ready, without waiting for Ctrl-C."""

@@ -1,4 +1,4 @@
-"""Planning over (cell, heading) with the times of the primitives: the time-optimal way, turns included."""
+"""Planning over (cell, heading) with the durations of the primitives: the time-optimal path, including turns."""
 
 from jaxbiped.core.lazy_loading import lazy_package
 

@@ -1,4 +1,4 @@
-"""The direction in which each move over an edge of the ground is played: square to the edge, to 45 degrees."""
+"""The direction in which each move over an edge of the ground is played: perpendicular to it, to 45 degrees."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from jaxbiped.planning import kernels
 from jaxbiped.planning.arguments import grid_arguments
 from jaxbiped.planning.costs import DIRECTIONS
 
-WINDOW = 0.20  # [m] radius of the disc of cells around a move that say how its edge runs; as `motion.edge`
-SLANT = math.radians(50.0)  # the edge is not believed to be further off square than that; as `motion.edge`
+WINDOW = 0.20  # [m] radius of the disc of cells around a move that determine its edge; as in `motion.edge`
+SLANT = math.radians(50.0)  # the edge is assumed to deviate no more than this from perpendicular; as in `motion.edge`
 EIGHTH = math.pi / 4
-NOWHERE = 999  # no level
+NOWHERE = 999  # not a level
 
 
 def crossing_faces(classes: Any, levels: Any, pitch: float) -> Int8[Array, "*B 8 H W"]:
-    """The direction (of the eight) nearest to the one square to the edge, for the move out of each cell in each.
+    """The direction (of the eight) nearest to perpendicular to the edge, for each move out of each cell.
 
-    `motion.edge.crossing_direction` of all moves at once (paper, 2.4), rounded to 45 degrees. It says something of
-    moves over an edge of one level alone; where no edge is seen it is the move's own direction. Leading axes broadcast.
+    `motion.edge.crossing_direction` for all moves at once (paper, 2.4), rounded to 45 degrees. It is meaningful only
+    for moves over an edge of one level; if no edge is seen it is the move's own direction. Leading axes broadcast.
 
     Args:
-      classes, levels: as of `planning.field`.
+      classes, levels: as for `planning.field`.
       pitch: static [m].
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete.
     """
     batch, (classes, levels) = grid_arguments(classes, levels)
     known = (classes != Cell.UNMEASURED) & (classes < Cell.OBSTACLE) & (classes >= 0)
@@ -47,7 +47,7 @@ def crossing_faces(classes: Any, levels: Any, pitch: float) -> Int8[Array, "*B 8
 
 @cache
 def on_cpu(half: int):
-    """The compiled kernel for a window of `half` cells, as a function that `vmap` knows what to do with."""
+    """The compiled kernel for a window of `half` cells, as a function that supports `vmap`."""
     return folding_vmap(lambda known, levels: kernels.crossing_faces(known, levels, half, SLANT))
 
 
@@ -57,9 +57,9 @@ def window(pitch: float) -> int:
 
 
 def dense_faces(known: Bool[Array, "B H W"], levels: Int[Array, "B H W"], pitch: float) -> Int8[Array, "B 8 H W"]:
-    """The same for an accelerator: of all moves, by convolutions.
+    """The same for accelerators: all moves, by convolutions.
 
-    A move and the move back lie square to the same edge, so that half of them are computed.
+    A move and its reverse are perpendicular to the same edge, so only half of them are computed.
     """
     here = levels.astype(jnp.int32)
     there = jnp.stack([beside(here, *DIRECTIONS[k], NOWHERE) for k in range(4)], axis=1)
@@ -67,7 +67,7 @@ def dense_faces(known: Bool[Array, "B H W"], levels: Int[Array, "B H W"], pitch:
     shape = (len(known), 4, 3, *known.shape[1:])
 
     def one_level(level, sums):
-        # both sums are over cells of one level, each level in its turn: there are few
+        # both sums are over cells of one level, level by level: there are few
         ground = (known & (here == level)).astype(jnp.float32)[:, None]
         sums_here = lax.conv_general_dilated(ground, kernel, (1, 1), "SAME", precision="highest").reshape(shape)
         beyond = jnp.where((there == level)[:, :, None], sums_here, sums[0])
@@ -76,13 +76,13 @@ def dense_faces(known: Bool[Array, "B H W"], levels: Int[Array, "B H W"], pitch:
     low, high = (f(jnp.where(known, here, o)) for f, o in ((jnp.min, NOWHERE), (jnp.max, -NOWHERE)))
     beyond, before = lax.fori_loop(low, high + 1, one_level, (jnp.zeros(shape), jnp.zeros(shape)))
     first = jnp.stack([square(k, (beyond - before)[:, k], (beyond + before)[:, k]) for k in range(4)], axis=1)
-    # the move back starts at the other end
+    # the reverse move starts at the other end
     back = [(beside(first[:, k], *DIRECTIONS[k + 4], 0) + 4) % 8 for k in range(4)]
     return jnp.concatenate([first, jnp.stack(back, axis=1)], axis=1).astype(jnp.int8)
 
 
 def discs(pitch: float) -> Float[np.ndarray, "12 1 n n"]:
-    """Of the first four directions, over a disc of cells around the middle of the move: one, and the offset (i, j)."""
+    """For the first four directions, over a disc of cells around the middle of the move: one, and the offset (i, j)."""
     half = window(pitch)
     i, j = np.mgrid[-half : half + 1, -half : half + 1]
     kernels = []
@@ -93,10 +93,10 @@ def discs(pitch: float) -> Float[np.ndarray, "12 1 n n"]:
 
 
 def square(k: int, total: Float[Array, "B 3 H W"], count: Float[Array, "B 3 H W"]) -> Int[Array, "B H W"]:
-    """The direction nearest to square to the edge under moves in direction k.
+    """The direction nearest to perpendicular to the edge under moves in direction k.
 
     Args:
-      total, count: of the cells beyond the edge less, and plus, those before it: how many, and first moments.
+      total, count: of the cells beyond the edge minus, and plus, those before it: how many, and first moments.
     """
     share = total[:, 0] / jnp.maximum(count[:, 0], 1.0)
     di, dj = (total[:, axis] - count[:, axis] * share for axis in (1, 2))
@@ -107,7 +107,7 @@ def square(k: int, total: Float[Array, "B 3 H W"], count: Float[Array, "B 3 H W"
 
 
 def beside(array: Array, di: int | np.integer, dj: int | np.integer, outside: float | int) -> Array:
-    """`array[b, i + di, j + dj]`, or `outside` there."""
+    """`array[b, i + di, j + dj]`, or `outside` beyond the grid."""
     height, width = array.shape[-2:]
     padded = jnp.pad(array, [(0, 0)] * (array.ndim - 2) + [(1, 1), (1, 1)], constant_values=outside)
     return padded[..., 1 + di : 1 + di + height, 1 + dj : 1 + dj + width]

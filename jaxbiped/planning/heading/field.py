@@ -28,12 +28,12 @@ NO_GRADIENT = "a field of times has no gradient: differentiate `planning.path_ti
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class HeadingField:
-    """Least time from each cell and heading to the goal, in any heading there."""
+    """Shortest time from each cell and heading to the goal, in any heading there."""
 
-    cost: Float[Array, "*B 8 H W"]  # [s]; inf: no way, or not converged
-    moves: Moves  # that it is made of
+    cost: Float[Array, "*B 8 H W"]  # [s]; inf: no path, or not converged
+    moves: Moves  # the moves that it is based on
     turn: Float[Array, "*B"]  # [s] for 45 degrees
-    converged: Bool[Array, "*B"]  # whether the times are exact: one more relaxation, which was made, lowers none
+    converged: Bool[Array, "*B"]  # whether the times are exact: one more relaxation, which is done, lowers none
 
 
 def heading_field(
@@ -46,22 +46,22 @@ def heading_field(
     extra: Any = None,
     method: str = "auto",
 ) -> HeadingField:
-    """Least time from each (heading, cell) to `goal_ij`, on the moves of `heading_moves` and turns on the spot.
+    """Shortest time from each (heading, cell) to `goal_ij`, with the moves of `heading_moves` and turns on the spot.
 
     The state of the robot's plan is its cell and which of the eight directions it faces. Turning by 45 degrees takes
-    `times.turn`, anywhere; a move is made facing its direction. So the least time is that of the best plan, turns and
-    all, where Eq. 1 knows no turns (an extension of the paper). Leading axes broadcast. May be called inside `jit`,
+    `times.turn`, anywhere; a move is made facing its direction. So the result is the time of the best plan including
+    turns, while Eq. 1 has no turns (an extension of the paper). Leading axes broadcast. May be called inside `jit`,
     `vmap` and `scan`. There is no gradient: differentiate `path_time` of the path that the field gives.
 
     Args:
       classes, levels, times, rules, pitch, extra: see `heading_moves`; Table 2's times by default. A map with a time
         that is NaN, negative or infinite does not converge.
-      goal_ij: [*B, 2], integers, row and column; a goal outside the grid is reached from nowhere.
-      method: static: "wavefront" (any device), "line_sweep" or "dijkstra" (CPU), or "auto": line sweeps on a CPU,
-        Dijkstra there for few large grids, the wavefront elsewhere.
+      goal_ij: [*B, 2], integers, row and column; a goal outside the grid cannot be reached.
+      method: static: "wavefront" (any device), "line_sweep" or "dijkstra" (CPU), or "auto": line sweeps on a CPU, but
+        Dijkstra for few large grids, and the wavefront on other devices.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known; a
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete; a
         method that this device does not have.
     """
     if goal_ij is None:
@@ -87,7 +87,7 @@ def heading_field(
 
 @cache
 def differentiated(pitch: float, method: str):
-    """The field as a function of arrays that `vmap` and `grad` know what to do with."""
+    """The field as a function of arrays that supports `vmap` and `grad`."""
     return without_gradient(folding_vmap(partial(solve, pitch=pitch, method=method)), NO_GRADIENT)
 
 
@@ -99,11 +99,11 @@ def settled(inputs, pitch: float, method: str) -> HeadingField:
 
 def solve(classes, levels, times: Times, rules: Rules, goal_ij, extra=None, *, pitch: float, method: str):
     """`settled`, without the rules for `vmap` and `grad`."""
-    valid = jnp.stack([(leaf >= 0) & (leaf < jnp.inf) for leaf in jax.tree.leaves(times)]).all(0)  # no NaN either
+    valid = jnp.stack([(leaf >= 0) & (leaf < jnp.inf) for leaf in jax.tree.leaves(times)]).all(0)  # excludes NaN
     times = jax.tree.map(lambda leaf: jnp.where(valid, leaf, 0.0), times)
     moves = moves_of(classes, levels, times, rules, pitch, extra)
     valid &= are_classes(classes) & (moves.time >= 0).all((1, 2, 3))
-    goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing is reached
+    goal_ij = jnp.where(valid[:, None], goal_ij, -1)  # from where nothing can be reached
     with jax.enable_x64(True):  # sums of a thousand moves drift as float32
         if method == "wavefront":
             cost, proven = wavefront(moves.time, moves.face, times.turn, goal_ij)
@@ -115,39 +115,39 @@ def solve(classes, levels, times: Times, rules: Rules, goal_ij, extra=None, *, p
 def wavefront(
     time: Float[Array, "B 8 H W"], face: Int[Array, "B 8 H W"], turn: Float[Array, "B"], goal_ij: Int[Array, "B 2"]
 ) -> tuple[Float[Array, "B 8 H W"], Bool[Array, "B"]]:
-    """All states relaxed at once until nothing changes: little depth and much work, as an accelerator wants.
+    """Relax all states at once until nothing changes: little depth and much work, as suits an accelerator.
 
-    Each round makes one move and any turn. Sums are float64. Also: whether the last round changed nothing.
+    Each round makes one move and any turn. Sums are float64. Also returns whether the last round changed nothing.
     """
     batch, _, height, width = time.shape
     rows, columns = jnp.arange(height)[:, None], jnp.arange(width)
     goal = (rows == goal_ij[:, 0, None, None]) & (columns == goal_ij[:, 1, None, None])
     start = jnp.broadcast_to(jnp.where(goal, 0.0, jnp.inf).astype(jnp.float64)[:, None], time.shape)
     turn, time = turn[:, None, None, None].astype(jnp.float64), time.astype(jnp.float64)
-    # in each heading three moves may be made, its own and those 45 degrees to either side; the state each leads to
+    # in each heading three moves are possible, its own and those at 45 degrees to it; the state each leads to
     heading, off = np.arange(8)[:, None], np.array([-1, 0, 1])
     k = (heading + off) % 8
     taken = jnp.where(face[:, k] == heading[..., None, None], time[:, k], jnp.inf)  # [B, 8, 3, H, W]
     i, j = (np.arange(n) + DIRECTIONS[k][:, :, axis, None] for axis, n in ((0, height), (1, width)))
     inside = ((i >= 0) & (i < height))[..., None] & ((j >= 0) & (j < width))[:, :, None]
     to = (heading[..., None, None] * height + i[..., None]) * width + j[:, :, None]
-    to = np.where(inside, to, 0)  # nowhere: such a move is forbidden
+    to = np.where(inside, to, 0)  # any cell: such a move is forbidden
 
     def body(state):
         cost, _, step = state
         after = cost.reshape(batch, 8 * height * width)[:, to]
         new = jnp.minimum(cost, (after + taken).min(2))
-        for eighths in (1, 2, 1):  # which together reach all that is up to 180 degrees off
+        for eighths in (1, 2, 1):  # together they reach all turns up to 180 degrees
             for way in (eighths, -eighths):
                 new = jnp.minimum(new, jnp.roll(new, way, axis=1) + eighths * turn)
         return new, jnp.any(new < cost, axis=(1, 2, 3)), step + 1
 
-    # A round settles one more state of each least way at least.
+    # A round settles at least one more state of each shortest path.
     again = lambda state: jnp.any(state[1]) & (state[2] < most_rounds(height, width))  # noqa: E731
     cost, changed, _ = lax.while_loop(again, body, (start, jnp.ones(batch, bool), jnp.int32(0)))
     return cost.astype(jnp.float32), ~changed
 
 
 def most_rounds(height: int, width: int) -> int:
-    """Rounds after which nothing can change any more: the last of them shows it."""
+    """Number of rounds after which nothing can change any more: the last of them shows it."""
     return 8 * height * width + 1

@@ -1,4 +1,4 @@
-"""Reading ways off a field over (cell, heading), and timing the ways that Eq. 1 chooses."""
+"""Read paths from a field over (cell, heading), and time the paths that Eq. 1 chooses."""
 
 from __future__ import annotations
 
@@ -24,22 +24,21 @@ EIGHTH = math.pi / 4
 
 
 def eighths(angle: Float[Array, "*S"]) -> Float[Array, "*S"]:
-    """How many turns of 45 degrees an angle [rad] is, whichever way round it is shorter: 0 to 4."""
+    """Number of turns of 45 degrees in an angle [rad], in the shorter direction: 0 to 4."""
     return jnp.abs(jnp.mod(angle + math.pi, 2 * math.pi) - math.pi) / EIGHTH
 
 
 def heading_path(field: HeadingField, start_ij: Any, yaw: Any, max_length: int) -> Path:
-    """The quickest way from each start. `Path.cost` is its time [s], with the turn from `yaw` to the first move.
+    """The fastest path from each start. `Path.cost` is its time [s], with the turn from `yaw` to the first move.
 
-    Of ways that are equally quick (`planning.path.TIE`) it keeps to the robot's present direction, else takes the first
-    in the order of `DIRECTIONS`. It ends at the goal. Leading axes broadcast. May be called inside `jit`, `vmap` and
-    `scan`.
+    Among equally fast paths (`planning.path.TIE`) it keeps the robot's present direction, else takes the first in the
+    order of `DIRECTIONS`. It ends at the goal. Leading axes broadcast. May be called inside `jit`, `vmap` and `scan`.
 
     Args:
-      field: where it did not converge there is no way.
-      start_ij: [*B, 2], integers; outside the grid there is no way.
+      field: where it did not converge there is no path.
+      start_ij: [*B, 2], integers; outside the grid there is no path.
       yaw: [*B] [rad] any, not only multiples of 45 degrees.
-      max_length: static; number of moves that there is room for.
+      max_length: static; largest number of moves.
 
     Raises:
       InputError: an argument of another rank, shape or dtype.
@@ -59,7 +58,7 @@ def heading_path(field: HeadingField, start_ij: Any, yaw: Any, max_length: int) 
 
 
 def field_arguments(moves: Moves, turn: Any) -> dict[str, tuple[Any, str]]:
-    """Moves and the time of a turn, checked, as `leading_shape` takes them."""
+    """Moves and the time of a turn, checked, in the form for `leading_shape`."""
     return {
         "moves.time": (reals("moves.time", moves.time, "8 H W"), "8 H W"),
         "moves.face": (narrowed(integers("moves.face", moves.face, "8 H W", (0, 7)), np.int8, 0, 7), "8 H W"),
@@ -75,7 +74,7 @@ def _heading_path(field: HeadingField, start, yaw, max_length: int) -> Path:
     inside = ((start >= 0) & (start < jnp.array([height, width]))).all(-1)
 
     def ahead(ij, yaw):
-        """Of each direction: the whole time, the time to go after the move, and what the robot then faces."""
+        """For each direction: the total time, the time to go after the move, and the heading after it."""
         at = (arena, slice(None), ij[:, 0], ij[:, 1])
         time, face = field.moves.time[at], field.moves.face[at].astype(jnp.int32)
         near = ij[:, None] + moves
@@ -108,12 +107,12 @@ def _heading_path(field: HeadingField, start, yaw, max_length: int) -> Path:
 
 
 def path_time(moves: Moves, turn: Any, path: Path, yaw: Any) -> Float[Array, "*B"]:
-    """What any way takes [s], that of Eq. 1 for one: turns from `yaw` on, and moves; inf where it is not valid.
+    """Duration [s] of any path, such as that of Eq. 1: turns from `yaw` on, and moves; inf if it is not valid.
 
     Leading axes broadcast. May be called inside `jit`, `vmap`, `scan` and `grad`.
 
     Args:
-      moves: of `heading_moves`; turn: [*B] [s] for 45 degrees.
+      moves: from `heading_moves`; turn: [*B] [s] for 45 degrees.
       path: on the same grid; yaw: [*B] [rad].
 
     Raises:

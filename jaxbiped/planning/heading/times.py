@@ -1,4 +1,4 @@
-"""What moves over (cell, heading) take: the times of the primitives, and of the measurements between them."""
+"""Durations of moves over (cell, heading): those of the primitives, and of the measurements between them."""
 
 from __future__ import annotations
 
@@ -28,22 +28,22 @@ from jaxbiped.planning.costs import (
 )
 from jaxbiped.planning.heading.edge_direction import beside, crossing_faces
 
-LEAST = 0.05  # [s] that a move takes at least: a way must come nearer to its goal with each cell
-REACH = math.sqrt(2.0)  # [cells of 5 cm] that a step over an edge carries the robot forward, at most
+LEAST = 0.05  # [s] shortest duration of a move: a path must come nearer to its goal with each cell
+REACH = math.sqrt(2.0)  # [cells of 5 cm] longest forward displacement of a step over an edge
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Times:
-    """What the motions take [s] (paper, Table 2, and a measurement); scalars, or one an arena. All traced."""
+    """Durations of the motions [s] (paper, Table 2, and a measurement); scalars, or one per arena. All traced."""
 
     straight: Float[Array, "*B"] | float = 16.0  # 5 cm forward
     turn: Float[Array, "*B"] | float = 5.0  # 45 degrees
     step_up: Float[Array, "*B"] | float = 96.0  # one level
     step_down: Float[Array, "*B"] | float = 96.0
-    pass_gate: Float[Array, "*B"] | float = 48.0  # 5 cm forward, squatting; getting down and up is in it
+    pass_gate: Float[Array, "*B"] | float = 48.0  # 5 cm forward, squatting; including getting down and up
     measure: Float[Array, "*B"] | float = 10.0  # after each primitive
-    unmeasured: Float[Array, "*B"] | float = 800.0  # what 5 cm into the unmeasured are feared to cost: C4 at 8 s a unit
+    unmeasured: Float[Array, "*B"] | float = 800.0  # expected cost of 5 cm into unmeasured cells: C4 at 8 s per unit
 
 
 @jax.tree_util.register_dataclass
@@ -52,31 +52,31 @@ class Moves:
     """Moves out of each cell in each of `DIRECTIONS`."""
 
     time: Float[Array, "*B 8 H W"]  # [s] without the turn to `face`; inf: forbidden
-    face: Int8[Array, "*B 8 H W"]  # the direction that the robot faces from then on: the move's own, but for edges
+    face: Int8[Array, "*B 8 H W"]  # the direction that the robot faces from then on: the move's own, except at edges
 
 
 def heading_moves(
     classes: Any, levels: Any, times: Times, rules: Rules, pitch: float = BASE_PITCH, extra: Any = None
 ) -> Moves:
-    """The moves that Eq. 1 knows, in the seconds that the mission's clock counts for them (`motion.duration`).
+    """The moves of Eq. 1, with the seconds that the mission's clock counts for them (`motion.duration`).
 
-    A move is a decision: what its primitive takes, and a measurement. On pitches below 5 cm several moves in line are
-    one primitive, and share its measurement. Precedence is that of Eq. 1 (`costs.move_kind`): an end unmeasured, then a
-    step, then an end in a gate. Over an edge the robot faces square to it (`crossing_faces`), and stays so; a step
-    carries it forward, and what the move leads to the side of that is walked. Before the unmeasured it looks once more.
-    Leading axes broadcast.
+    A move is a decision: the duration of its primitive, and a measurement. On pitches below 5 cm several moves in line
+    are one primitive, and share its measurement. Precedence is that of Eq. 1 (`costs.move_kind`): an end unmeasured,
+    then a step, then an end in a gate. Over an edge the robot faces perpendicular to it (`crossing_faces`), and stays
+    so; a step carries it forward, and the lateral part of the move is walked. Before unmeasured cells it looks once
+    more. Leading axes broadcast.
 
-    Deviations from the clock: yaws are multiples of 45 degrees and places are cells; a primitive that crosses an edge
-    on a fine pitch carries the robot over several cells, here over one.
+    Deviations from the clock: yaws are multiples of 45 degrees and positions are cells; a primitive that crosses an
+    edge on a fine pitch carries the robot over several cells, here over one.
 
     Args:
-      classes, levels: as of `planning.field`.
+      classes, levels: as for `planning.field`.
       times, rules: leaves [*B]; none of the times negative or NaN.
       pitch: static [m].
-      extra: [*B, 8, H, W], seconds to be added to each move, not below 0.
+      extra: [*B, 8, H, W], seconds to add to each move, not below 0.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value that is not allowed where values are known.
+      InputError: an argument of another rank, shape or dtype, or a value out of range where values are concrete.
     """
     pitch = checked_pitch(pitch)
     arrays = {} if extra is None else {"extra": (reals("extra", extra, "8 H W"), "8 H W")}
@@ -105,7 +105,7 @@ def moves_of(
     pitch: float,
     extra: Float[Array, "B 8 H W"] | None = None,
 ) -> Moves:
-    """`heading_moves` of arguments that are checked, all [B]."""
+    """`heading_moves` for checked arguments, all [B]."""
 
     t, allowed = jax.tree.map(lambda leaf: leaf[:, None, None], (times, rules))
     kinds = cell_kinds(classes, allowed)
