@@ -9,6 +9,7 @@ told of planners that are compiled into the mission's program.
 """
 
 import argparse
+import time
 from pathlib import Path
 
 import polars as pl
@@ -33,7 +34,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     args = parser.parse_args()
     study = jb.Study(jb.RandomArenas(count=args.arenas), STRATEGIES, seed=args.seed)
+    begun = time.perf_counter()
     results = jb.evaluate(study, out=args.out)
+    seconds = time.perf_counter() - begun
     columns = "planner", "reached %", "interval", "minus full, points", "interval", "time minus full, min", "interval"
     table = Table(*columns, "fell, hit %", "plan ms", title=f"{args.arenas} arenas, seed {args.seed}")
     for name in results.strategies:
@@ -44,14 +47,16 @@ def main() -> None:
             cells += ["", "", "", ""]
         else:
             pair = results.compare(name, "full").statistics.pair(name, "full")
-            time = pair.time.mean
+            minutes = pair.time.mean
             cells += [f"{100 * pair.success.estimate:+.1f}", span(pair.success, 100)]
-            cells += [f"{time.estimate / 60:+.2f}" if time.valid else "-", span(time, 1 / 60, 2)]
+            cells += [f"{minutes.estimate / 60:+.2f}" if minutes.valid else "-", span(minutes, 1 / 60, 2)]
         hurt = rows["code"].is_in(["fell", "collided", "out_of_bounds"]).mean()
         spent = rows["planning_time"].sum() / rows["planning_calls"].sum() if rows["planning_time"].count() else None
         cells += [f"{100 * hurt:.1f}", "in the program" if spent is None else f"{1000 * spent:.1f}"]
         table.add_row(*cells)
     Console(width=160).print(table)
+    outside = results.rows["planning_time"].sum()
+    print(f"Of {seconds:.0f} s, {outside:.0f} s of planning on the host, summed over the queues that plan at once.")
 
 
 def span(value, scale: float, digits: int = 1) -> str:
