@@ -84,7 +84,8 @@ def update(
         view = jax.lax.optimization_barrier(view)
     index, counts = voxel_of(view, pose, params, spec)
     if eye is not None:
-        grid_map = forget(grid_map, view, voxelise(view, index, counts, params, spec), pose, eye, spec)
+        points = without_few(voxelise(view, index, counts, spec), params, spec)
+        grid_map = forget(grid_map, view, points, pose, eye, spec)
     return add_view(grid_map, view, pose.z, index, counts, careful(body, params), params, spec)
 
 
@@ -119,7 +120,7 @@ def add_view_jvp(spec, primals, tangents):
 
 def add_view_by_xla(grid_map, view, z, index, counts, body, params, spec):
     """`add_view` in JAX."""
-    points = voxelise(view, index, counts, params, spec)
+    points = without_few(voxelise(view, index, counts, spec), params, spec)
     count = points.sum(-1)
     count = jnp.where(count >= params.view_points * spec.cell_share, count, 0.0)
     surfaces = add_surfaces(grid_map.surfaces, view, z, index, counts, params, spec)
@@ -154,14 +155,16 @@ def voxel_of(view: View, pose: Pose, params: MapParams, spec: GridSpec) -> tuple
     return index, counts
 
 
-def voxelise(
-    view: View, index: Int[Array, "N"], counts: Bool[Array, "N"], params: MapParams, spec: GridSpec
-) -> Float[Array, "H W Z"]:
-    """Pixels of one view in each voxel, few of which are none: one scatter."""
+def voxelise(view: View, index: Int[Array, "N"], counts: Bool[Array, "N"], spec: GridSpec) -> Float[Array, "H W Z"]:
+    """Pixels of one view in each voxel: one scatter."""
     (height, width), depth = spec.shape, spec.levels
     flat = jnp.zeros(height * width * depth)
     flat = flat.at[index].add(jnp.where(counts, view.weight, 0.0), mode="promise_in_bounds")
-    points = flat.reshape(height, width, depth)
+    return flat.reshape(height, width, depth)
+
+
+def without_few(points: Float[Array, "H W Z"], params: MapParams, spec: GridSpec) -> Float[Array, "H W Z"]:
+    """Pixels of one view, where a voxel with too few of them has none."""
     return jnp.where(points >= params.voxel_points * spec.cell_share, points, 0.0)
 
 
