@@ -17,10 +17,13 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.core import checks
+from jaxbiped.core.batching import by_batch_size
 from jaxbiped.core.signatures import checked
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, patch_sum
 from jaxbiped.mapping.params import MapParams
 from jaxbiped.mapping.relief import SURE, Relief, Surfaces, greater, greatest_within, is_untenable, read_relief
+
+MANY = 8  # maps at once from which machine code of our own is worth the seconds that it takes to compile
 
 
 @checked(numbers=("evidence", "surfaces", "body", "params"))
@@ -56,9 +59,10 @@ def c_obstacles(
 def class_cells(
     evidence: Float[Array, "H W Z"], surfaces: Surfaces, body: Body, params: MapParams, spec: GridSpec
 ) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
-    """`c_obstacles` of arguments that are known to be good: on a CPU by a compiled kernel, elsewhere by XLA."""
+    """`c_obstacles` of arguments that are known to be good: as `gridmap.add_view`, by a kernel or by XLA."""
     by_kernel, by_xla = (partial(way, spec=spec) for way in (class_by_kernel, class_by_xla))
-    return jax.lax.platform_dependent(evidence, surfaces, body, params, cpu=by_kernel, default=by_xla)
+    read = by_batch_size(by_xla, partial(jax.lax.platform_dependent, cpu=by_kernel, default=by_xla), MANY)
+    return read(evidence, surfaces, body, params)
 
 
 @class_cells.defjvp
@@ -90,8 +94,8 @@ def class_by_kernel(evidence, surfaces, body, params, spec):
 
 def kernel_settings(
     body: Body, params: MapParams, spec: GridSpec
-) -> tuple[Float[Array, "K"], Bool[Array, "R R"], UInt32[Array, "2"]]:
-    """The numbers, the disc and the levels in the way that `kernels.map_update` reads a map by."""
+) -> tuple[Float[Array, "K"], Int[Array, "R"], UInt32[Array, "2"]]:
+    """The numbers, the rows of the disc and the levels in the way that `kernels.map_update` reads a map by."""
     numbers = (
         params.voxel_points * spec.cell_share, params.voxel_share, params.solid_points,
         jnp.inf if params.below_points is None else params.below_points,
@@ -99,7 +103,8 @@ def kernel_settings(
         params.view_points * spec.cell_share,
     )  # fmt: skip
     bands = jnp.stack(obstructing_levels(body, params.head_margin, spec))
-    return jnp.stack([jnp.asarray(n, jnp.float32) for n in numbers]), disc(body.radius, spec), bands
+    reaches = jnp.sum(disc(body.radius, spec), 1, dtype=jnp.int32) - 1
+    return jnp.stack([jnp.asarray(n, jnp.float32) for n in numbers]), reaches, bands
 
 
 def careful(body: Body, params: MapParams) -> Body:

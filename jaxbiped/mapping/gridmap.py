@@ -10,9 +10,10 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.core import checks
+from jaxbiped.core.batching import by_batch_size
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_world
-from jaxbiped.mapping.cobstacles import careful, class_by_xla, kernel_settings
+from jaxbiped.mapping.cobstacles import MANY, careful, class_by_xla, kernel_settings
 from jaxbiped.mapping.fading import Eye, forget
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, flat_index
 from jaxbiped.mapping.leveling import level_view
@@ -100,7 +101,9 @@ def add_view(
     params: MapParams,
     spec: GridSpec,
 ) -> GridMap:
-    """The map of one arena after what one more view tells: on a CPU by a compiled kernel, elsewhere by XLA.
+    """The map of one arena after what one more view tells.
+
+    Maps of a batch are read by a compiled kernel on a CPU; single ones, and all on other devices, by XLA.
 
     Args:
       view: brought level, in the robot frame; `z` [m] the height of what the robot stands on.
@@ -108,8 +111,8 @@ def add_view(
       body: the careful one (`cobstacles.careful`).
     """
     by_kernel, by_xla = (partial(way, spec=spec) for way in (add_view_by_kernel, add_view_by_xla))
-    arguments = grid_map, view, z, index, counts, body, params
-    return jax.lax.platform_dependent(*arguments, cpu=by_kernel, default=by_xla)
+    add = by_batch_size(by_xla, partial(jax.lax.platform_dependent, cpu=by_kernel, default=by_xla), MANY)
+    return add(grid_map, view, z, index, counts, body, params)
 
 
 @add_view.defjvp
@@ -134,7 +137,7 @@ def add_view_by_kernel(grid_map, view, z, index, counts, body, params, spec):
     from jaxbiped.mapping.kernels import map_update  # with Numba, which only a CPU needs
 
     maps = grid_map.evidence, grid_map.votes, grid_map.level_votes, grid_map.surfaces
-    points = index, counts, view.weight, surface_share(view, params), view.z + z
+    points = jnp.where(counts, index, -1), view.weight, surface_share(view, params), view.z + z
     evidence, votes, level_votes, weight, rise, *_ = map_update.add_view(
         maps, points, *kernel_settings(body, params, spec), spec
     )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jaxbiped.mapping.kernels.windows import INF, U, compiled, greater_of
+from jaxbiped.mapping.kernels.windows import INF, U, compiled, greater_of, masks_of
 
 
 @compiled
@@ -65,7 +65,7 @@ def most_beside(points, z, i, j, height, width, depth, beside):
 def read_columns(evidence, shape, layout, numbers, bits, points, columns, ground, peaks):
     """`cobstacles.occupied_levels` and `ground_level`; and the most points of a patch in each column."""
     (height, width, depth, margin, across), (lowest, _, _, grounds) = shape, layout
-    beside, size = np.zeros(len(evidence), np.float32), len(evidence)
+    beside, size = np.empty(len(evidence), np.float32), len(evidence)
     greater_of(evidence, 0, evidence, 2, size - 2, beside, 1)
     for first in range(0, size if depth > 1 else 0, depth):  # the ends of columns are not each other's neighbours
         beside[first], beside[first + depth - 1] = evidence[first + 1], evidence[first + depth - 2]
@@ -86,7 +86,7 @@ def read_solid(points, shape, layout, numbers, bits, columns, most, solid):
     """
     (height, width, depth, margin, across), (_, _, beside, _) = shape, layout
     share, solid_points, below_points = numbers[1], numbers[2], numbers[3]
-    dense, around = np.zeros(len(columns), np.uint32), np.zeros(len(columns), np.uint32)
+    dense, around = masks_of(len(columns)), masks_of(len(columns))
     for i in range(height):
         for j in range(width):
             first, at = (i * width + j) * depth, (i + margin) * across + j + margin

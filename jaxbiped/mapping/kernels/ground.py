@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from jaxbiped.mapping.kernels.windows import INF, U, compiled, greatest_around, greatest_within, sum_patches
+from jaxbiped.mapping.kernels.windows import (
+    INF,
+    U,
+    compiled,
+    greatest_around,
+    greatest_within,
+    masks_of,
+    numbers_of,
+    sum_patches,
+)
 from jaxbiped.mapping.relief import EDGE, SHARE
 
 EDGE_32, SHARE_32, FEWEST = np.float32(EDGE), np.float32(SHARE), np.float32(1e-6)
@@ -13,11 +22,11 @@ def read_relief(weight, rise, shape, layout, error, heights, columns, ground, so
     """`relief.read_relief`: height and error of each cell's ground, and how high it is at least."""
     (height, width, _, margin, across), (_, aside, beside, grounds) = shape, layout
     cells, size = height * width, len(top)
-    values, room, other = np.zeros(size, np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
+    values, room, other = numbers_of(size, np.float32(0)), np.empty(size, np.float32), np.empty(size, np.float32)
     many, total = np.empty(cells, np.float32), np.empty(cells, np.float32)
     wide = np.empty(height * (width + 2 * aside), np.float32)
     means, errors = np.empty(grounds * cells, np.float32), np.empty(grounds * cells, np.float32)
-    is_top = np.empty(grounds * cells, np.bool_)
+    is_top = masks_of(grounds * cells)
     for level in range(grounds):
         start = level * cells
         for i in range(height):
@@ -28,14 +37,14 @@ def read_relief(weight, rise, shape, layout, error, heights, columns, ground, so
         for i in range(height):
             to, at = U(start + i * width), U((i + margin - beside) * across + margin - beside)
             for n in range(U(width)):
-                is_top[to + n] = weight[to + n] >= SHARE_32 * most[at + n]
+                is_top[to + n] = np.uint32(weight[to + n] >= SHARE_32 * most[at + n])
         sum_patches(weight, start, height, width, 1, aside, wide, many)
         sum_patches(rise, start, height, width, 1, aside, wide, total)
         for n in range(U(cells)):
             pixels = many[n] if many[n] > FEWEST else FEWEST
             means[U(start) + n] = heights[level] + total[n] / pixels
             errors[U(start) + n] = error / np.sqrt(pixels)
-    own = np.full(size, -INF, np.float32)
+    own = numbers_of(size, -INF)
     for i in range(height):
         for j in range(width):
             cell, at = i * width + j, (i + margin) * across + j + margin
@@ -61,8 +70,8 @@ def read_relief(weight, rise, shape, layout, error, heights, columns, ground, so
 def mark_untenable(height_of, error_of, shape, numbers, heights, ground, untenable):
     """`relief.is_untenable`."""
     (height, width, _, margin, across), most, half = shape, numbers[7], numbers[8]
-    high = np.full(len(ground), -INF, np.float32)  # surely at least
-    low = np.full(len(ground), -INF, np.float32)  # surely at most, its negative
+    high = numbers_of(len(ground), -INF)  # surely at least
+    low = numbers_of(len(ground), -INF)  # surely at most, its negative
     for i in range(margin, margin + height):
         for n in range(width):
             at = i * across + margin + n
@@ -71,8 +80,9 @@ def mark_untenable(height_of, error_of, shape, numbers, heights, ground, untenab
     for i in range(margin, margin + height):
         for n in range(width):
             at = i * across + margin + n
-            untenable[at] = high[at] > most or low[at] > most
+            off = high[at] > most or low[at] > most
             if high[at] > half:
-                untenable[at] |= high[at] + greatest_around(low, at, across) > most
+                off = off or high[at] + greatest_around(low, at, across) > most
             if low[at] > half:
-                untenable[at] |= low[at] + greatest_around(high, at, across) > most
+                off = off or low[at] + greatest_around(high, at, across) > most
+            untenable[at] = np.uint32(off)

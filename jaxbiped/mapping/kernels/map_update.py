@@ -8,7 +8,8 @@ from threading import Lock
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, UInt32
+from jaxtyping import Array, Float, Int, UInt32
+from numba import carray
 
 from jaxbiped.core import xla_ffi
 from jaxbiped.core.ready_programs import TARGETS
@@ -20,21 +21,21 @@ from jaxbiped.mapping.relief import FACE, Surfaces
 NAME = "jaxbiped_map_update"
 LOCK = Lock()
 NUMBERS, LAYOUT = 10, 4  # how many numbers of each kind the kernel is given
-POINT_KINDS = np.int32, np.bool_, np.float32, np.float32, np.float32
+POINT_KINDS = np.int32, np.float32, np.float32, np.float32
 FACE_32, FEWEST = np.float32(FACE), np.float32(1e-6)
 
 
 @compiled
-def add_points(index, counts, pixels, share, z, shape, layout, heights, old, new, points):
-    """`gridmap.voxelise` into `points`, and `relief.add_surfaces` from `old` (weight, rise) to `new`."""
-    (height, width, depth, _, _), (lowest, _, _, grounds) = shape, layout
-    (weights, rises), (new_weights, new_rises), cells = old, new, height * width
-    points[:] = 0
-    for n in range(len(weights)):
+def add_points(index, pixels, share, z, shape, layout, heights, weights, rises, new_weights, new_rises, points):
+    """`gridmap.voxelise` into `points`, and `relief.add_surfaces` to the weights and rises of the surfaces."""
+    cells, depth, lowest, grounds = shape[0] * shape[1], shape[2], layout[0], layout[3]
+    for n in range(U(len(points))):
+        points[n] = np.float32(0)
+    for n in range(U(len(weights))):
         new_weights[n], new_rises[n] = weights[n], rises[n]
     deep = np.uint32(depth)
     for n in range(len(index)):
-        if not counts[n]:
+        if index[n] < 0:
             continue
         voxel = np.uint32(index[n])
         points[U(voxel)] += pixels[n]
@@ -79,47 +80,58 @@ def add_votes(count, classes, levels, grounds, votes, level_votes, new_votes, ne
 
 
 @compiled
-def rows(buffers, k, batch, size, dtype):
-    """Buffer number `k` as one row of so many elements for each arena."""
-    return xla_ffi.array(buffers, k, batch * size, dtype).reshape((batch, size))
+def floats(buffers, k, arena, size):
+    """The `size` numbers of one arena in buffer number `k`."""
+    return carray(xla_ffi.pointer(xla_ffi.data(buffers, k) + U(4) * U(arena * size)), (size,), np.float32)
+
+
+@compiled
+def integers(buffers, k, arena, size):
+    """The same of int32."""
+    return carray(xla_ffi.pointer(xla_ffi.data(buffers, k) + U(4) * U(arena * size)), (size,), np.int32)
+
+
+@compiled
+def bytes_of(buffers, k, arena, size):
+    """The same of int8."""
+    return carray(xla_ffi.pointer(xla_ffi.data(buffers, k) + U(arena * size)), (size,), np.int8)
 
 
 @compiled
 def solve(arguments, count, results):
     """All arenas, as `xla_ffi.register` wants it; leading axes are batches."""
-    rank, dims = xla_ffi.rank(arguments, 0), xla_ffi.shape(arguments, 0)
+    rank, dims = xla_ffi.rank(arguments, U(0)), xla_ffi.shape(arguments, U(0))
     batch = 1
     for axis in range(rank - 3):
         batch *= np.int64(dims[axis])
     height, width, depth = np.int64(dims[rank - 3]), np.int64(dims[rank - 2]), np.int64(dims[rank - 1])
-    many = np.int64(xla_ffi.shape(arguments, 5)[rank - 3])
-    reach = np.int64(xla_ffi.shape(arguments, 11)[rank - 3])
-    given = xla_ffi.array(arguments, 13, LAYOUT, np.int32)
+    many = np.int64(xla_ffi.shape(arguments, U(5))[rank - 3])
+    reach = np.int64(xla_ffi.shape(arguments, U(10))[rank - 3])
+    given = integers(arguments, U(12), 0, LAYOUT)
     lowest, aside, beside, grounds = np.int64(given[0]), np.int64(given[1]), np.int64(given[2]), np.int64(given[3])
     margin, cells = max(reach - 1, beside, 1), height * width
     shape, layout = (height, width, depth, margin, width + 2 * margin), (lowest, aside, beside, grounds)
     voxels, planes = cells * depth, cells * grounds
-    evidence, more = rows(arguments, 0, batch, voxels, np.float32), rows(results, 0, batch, voxels, np.float32)
-    votes, new_votes = rows(arguments, 1, batch, 4 * cells, np.float32), rows(results, 1, batch, 4 * cells, np.float32)
-    level_votes, new_level_votes = (
-        rows(arguments, 2, batch, planes, np.float32), rows(results, 2, batch, planes, np.float32)
-    )  # fmt: skip
-    weight, new_weight = rows(arguments, 3, batch, planes, np.float32), rows(results, 3, batch, planes, np.float32)
-    rises, new_rises = rows(arguments, 4, batch, planes, np.float32), rows(results, 4, batch, planes, np.float32)
-    index, counts = rows(arguments, 5, batch, many, np.int32), rows(arguments, 6, batch, many, np.bool_)
-    pixels, share = rows(arguments, 7, batch, many, np.float32), rows(arguments, 8, batch, many, np.float32)
-    z, numbers = rows(arguments, 9, batch, many, np.float32), rows(arguments, 10, batch, NUMBERS, np.float32)
-    within, bands = rows(arguments, 11, batch, reach * reach, np.bool_), rows(arguments, 12, batch, 2, np.uint32)
-    heights = xla_ffi.array(arguments, 14, grounds, np.float32)
-    classes, levels = rows(results, 5, batch, cells, np.int8), rows(results, 6, batch, cells, np.int8)
-    points, votes_of = np.empty(voxels, np.float32), np.empty(cells, np.float32)
+    heights = floats(arguments, U(13), 0, grounds)
+    points, votes = np.empty(voxels, np.float32), np.empty(cells, np.float32)
     for b in range(batch):
-        old, new = (weight[b], rises[b]), (new_weight[b], new_rises[b])
-        add_points(index[b], counts[b], pixels[b], share[b], z[b], shape, layout, heights, old, new, points)
-        add_evidence(points, shape, numbers[b], evidence[b], more[b], votes_of)
-        disc = within[b].reshape((reach, reach))
-        class_arena(more[b], new[0], new[1], shape, layout, numbers[b], heights, disc, bands[b], classes[b], levels[b])
-        add_votes(votes_of, classes[b], levels[b], grounds, votes[b], level_votes[b], new_votes[b], new_level_votes[b])
+        numbers, more = floats(arguments, U(9), b, NUMBERS), floats(results, U(0), b, voxels)
+        new_weight, new_rise = floats(results, U(3), b, planes), floats(results, U(4), b, planes)
+        classes, levels = bytes_of(results, U(5), b, cells), bytes_of(results, U(6), b, cells)
+        add_points(
+            integers(arguments, U(5), b, many), floats(arguments, U(6), b, many), floats(arguments, U(7), b, many),
+            floats(arguments, U(8), b, many), shape, layout, heights, floats(arguments, U(3), b, planes),
+            floats(arguments, U(4), b, planes), new_weight, new_rise, points,
+        )  # fmt: skip
+        add_evidence(points, shape, numbers, floats(arguments, U(0), b, voxels), more, votes)
+        class_arena(
+            more, new_weight, new_rise, shape, layout, numbers, heights, integers(arguments, U(10), b, reach),
+            integers(arguments, U(11), b, 2), classes, levels,
+        )  # fmt: skip
+        add_votes(
+            votes, classes, levels, grounds, floats(arguments, U(1), b, 4 * cells), floats(arguments, U(2), b, planes),
+            floats(results, U(1), b, 4 * cells), floats(results, U(2), b, planes),
+        )  # fmt: skip
 
 
 @cache
@@ -132,9 +144,9 @@ def registered() -> str:
 
 def add_view(
     grid_map: tuple[Float[Array, "H W Z"], Float[Array, "H W 4"], Float[Array, "H W G"], Surfaces],
-    points: tuple[Int[Array, "N"], Bool[Array, "N"], Float[Array, "N"], Float[Array, "N"], Float[Array, "N"]],
+    points: tuple[Int[Array, "N"], Float[Array, "N"], Float[Array, "N"], Float[Array, "N"]],
     numbers: Float[Array, "K"],
-    disc: Bool[Array, "R R"],
+    reaches: Int[Array, "R"],
     bands: UInt32[Array, "2"],
     spec: GridSpec,
 ) -> tuple[Array, ...]:
@@ -142,12 +154,12 @@ def add_view(
 
     Args:
       grid_map: the evidence, the votes, those of levels, and the surfaces before this view.
-      points: of this view: the voxel of each, whether it counts, its pixels, how much they tell of the surface there,
-        and its height above the base floor [m].
+      points: of this view: the voxel of each, -1 if it does not count, its pixels, how much they tell of the surface
+        there, and its height above the base floor [m].
       numbers: least points of an occupied voxel; share of the points next to it; least points of a solid patch; the
         same below one, inf for none; standard error [m] of a height times the root of its pixels; step [m]; its
         tolerance; error [m] of the ground that a step bears; half of that; least points of a view's cell that votes.
-      disc: which offsets of rows and columns lie within the body's radius (`cobstacles.disc`).
+      reaches: how far the disc of the body's radius goes along a row so many rows away; -1: nowhere.
       bands: levels, counted from the ground, that squatting and standing bodies meet.
     """
     with LOCK:
@@ -165,8 +177,8 @@ def add_view(
         *((array, shape, np.float32) for array, shape in maps),
         *((array, points[0].shape, kind) for array, kind in zip(points, POINT_KINDS, strict=True)),
         (numbers, (NUMBERS,), np.float32),
-        (disc, (len(disc), len(disc)), np.bool_),
-        (bands, (2,), np.uint32),
+        (reaches, reaches.shape, np.int32),
+        (jax.lax.bitcast_convert_type(bands, jnp.int32), (2,), np.int32),
     )
     for array, shape, dtype in wanted:
         xla_ffi.expect(array, shape, dtype)

@@ -3,9 +3,28 @@
 import numpy as np
 from numba import njit
 
-compiled = njit(nogil=True, error_model="numpy")
+# Called by each other alone: wrappers for Python would take half the time to compile.
+compiled = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 U = np.uint64
 INF = np.float32(np.inf)
+
+
+@compiled
+def numbers_of(size, value):
+    """float32 [size], each of them `value`. (NumPy's own functions take Numba longer to compile.)"""
+    made = np.empty(size, np.float32)
+    for n in range(U(size)):
+        made[n] = value
+    return made
+
+
+@compiled
+def masks_of(size):
+    """uint32 [size], zeros."""
+    made = np.empty(size, np.uint32)
+    for n in range(U(size)):
+        made[n] = np.uint32(0)
+    return made
 
 
 @compiled
@@ -45,8 +64,10 @@ def sum_patches(planes, start, height, width, depth, aside, room, result):
         for n in range(U(height) * row):
             result[n] = planes[U(start) + n]
         return
-    room[:] = 0
-    result[:] = 0
+    for n in range(U(height * across)):
+        room[n] = np.float32(0)
+    for n in range(U(height) * row):
+        result[n] = np.float32(0)
     for i in range(height):
         to = U(i * across + aside * depth)
         for a in range(max(i - aside, 0), min(i + aside + 1, height)):
@@ -71,17 +92,19 @@ def greatest_around(values, at, across):
 
 
 @compiled
-def dilate(source, shape, within, nothing, combine):
-    """`cobstacles.dilate`; `within` [R, R] says which offsets count: a quarter of a disc, so each row ends once."""
+def dilate(source, shape, reaches, combine, line, sides, room, result):
+    """`cobstacles.dilate` by a disc that goes `reaches` [R] cells along the row so many rows away; below 0: nowhere.
+
+    The last four arrays are room for it, filled with what changes nothing; the result is in one of them.
+    """
     height, _, _, margin, across = shape
-    first, size = margin * across, height * across
-    line, sides, room = source.copy(), np.full_like(source, nothing), np.full_like(source, nothing)
-    result = np.full_like(source, nothing)
-    grown = 0
-    for rows in range(len(within) - 1, -1, -1):
-        if not within[rows, 0]:
+    first, size, grown = margin * across, height * across, 0
+    for n in range(U(len(source))):
+        line[n] = source[n]
+    for rows in range(len(reaches) - 1, -1, -1):
+        if reaches[rows] < 0:
             continue
-        while grown + 1 < len(within) and within[rows, grown + 1]:
+        while grown < reaches[rows]:
             grown += 1  # what this makes of the margins at the sides, nobody reads
             combine(source, first - grown, source, first + grown, size, sides, first)
             combine(sides, first, line, first, size, room, first)
