@@ -101,6 +101,6 @@ def play(
     config = MissionConfig() if mission is None else mission
     chosen = find_strategy(strategy) if isinstance(strategy, str) else named(strategy)
     check_mission(config)
-    with seeing(config) as eyes:
-        played = play_one(arena, config, chosen, noise_of(seed), on_decision, eyes)
+    with seeing(config) as rig:
+        played = play_one(arena, config, chosen, noise_of(seed), on_decision, rig)
     return PlayedMission(name, chosen.name, played)

@@ -11,7 +11,7 @@ from jaxbiped.commands.options.compare import CompareArgs
 from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
-from jaxbiped.mission.eyes import try_eyes
+from jaxbiped.mission.sensor_rig import try_rig
 from jaxbiped.report.folder_report import terminal_report, write_report
 from jaxbiped.statistics.comparison import default_pairs
 from jaxbiped.statistics.sequential import Goal
@@ -39,7 +39,7 @@ def main(args: CompareArgs) -> int:
     strategies = tuple(item.name for item in strategies_of(config))
     goal = goal_of(args, strategies)
     check_mission(config.mission)
-    try_eyes(config.mission)
+    try_rig(config.mission)
     out = args.out or Path("results") / f"compare-{config_hash(config)}"
     if not args.resume:
         refuse_taken(out)

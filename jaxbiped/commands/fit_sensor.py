@@ -14,7 +14,7 @@ from jaxbiped.arenas.arena import CIRCLE
 from jaxbiped.commands.options.fit_sensor import FitSensorArgs
 from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing, write_whole
-from jaxbiped.mission.eyes import StereoEyes
+from jaxbiped.mission.sensor_rig import StereoRig
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.config import CameraConfig, NoiseConfig
 from jaxbiped.study.fitting import ALIKE, Fit, choices, fit, sensor_toml
@@ -34,16 +34,16 @@ def main(args: FitSensorArgs) -> int:
     out = args.out or Path("results") / f"fit-sensor-{config_hash(args.model_copy(update={'out': None}))}.toml"
     refuse_existing(out)
     rendered = MissionConfig(sensor="stereo", camera=camera)
-    with contextlib.closing(StereoEyes(camera)) as eyes:
+    with contextlib.closing(StereoRig(camera)) as rig:
         places = list(worlds(args.seed, 0, args.arenas, args.views, rendered))
         print(f"camera     {camera.width} x {camera.height} px, {camera.field_of_view:g} degrees, "
               f"baseline {100 * camera.baseline:g} cm, {camera.image_noise:g} grey levels of noise")  # fmt: skip
-        found = fit(places, eyes, rendered)
+        found = fit(places, rig, rendered)
         said = sentences(found, args)
         store(out, found, args, said)
         print("\n".join(said))
         others = list(worlds(args.seed, args.arenas, args.arenas, args.views, rendered))
-        more = compared(others, eyes, rendered, found, args.missions)
+        more = compared(others, rig, rendered, found, args.missions)
         store(out, found, args, [*said, *more])
         print("\n".join(more))
     print(f"written    {out}")
@@ -77,14 +77,14 @@ def sentences(found: Fit, args: FitSensorArgs) -> list[str]:
     ]
 
 
-def compared(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, found: Fit, missions: int) -> list[str]:
+def compared(places: list[Place], rig: StereoRig, rendered: MissionConfig, found: Fit, missions: int) -> list[str]:
     """Agreement of the two sensors on arenas that were not used for the fit, with the fitted and the original noise."""
     rendered = rendered.model_copy(update={"stereo": found.sensor.stereo, "landmarks": found.sensor.landmarks})
     fitted = with_rays(rendered, found.sensor.rays)
     before = fitted.model_copy(update={"stereo": NoiseConfig()})
     others = {f"{rays.columns} x {rays.rows}": (with_rays(rendered, rays), None)
               for rays in choices(rendered.camera) if rays != found.sensor.rays}  # fmt: skip
-    each = {"stereo": (rendered, eyes), "fitted": (fitted, None)} | others | {"before": (before, None)}
+    each = {"stereo": (rendered, rig), "fitted": (fitted, None)} | others | {"before": (before, None)}
     maps = {name: [] for name in each}
     show = Console(stderr=True)
     for place in track(places, description="maps", console=show, transient=True):
@@ -104,7 +104,7 @@ def compared(places: list[Place], eyes: StereoEyes, rendered: MissionConfig, fou
         kinds = ", ".join(f"{kind} {rated.recall[kind]:.3f} / {rated.precision[kind]:.3f}" for kind in rated.recall)
         said.append(f"{name:<10} accuracy {rated.right:.3f}; recall / precision within one cell: {kinds}")
     if missions:
-        pairs = [(mission(place, rendered, eyes), mission(place, fitted, None)) for place in
+        pairs = [(mission(place, rendered, rig), mission(place, fitted, None)) for place in
                  track(places[:missions], description="missions", console=show, transient=True)]  # fmt: skip
         alike = sum(same(*pair) for pair in pairs)
         said.append(f"missions   {alike} of {len(pairs)} ended alike (code, and distance and time within 10 %)")

@@ -81,12 +81,12 @@ def gather(args: ReproduceArgs, arenas: dict[str, Arena], config: MissionConfig,
     seeds = range(args.seed, args.seed + args.repeats)
     of_table_1, of_mishaps, of_repeat = MISSIONS
     played = {}
-    with seeing(config) as eyes:
+    with seeing(config) as rig:
         with stage(console, "experiments", of_repeat * args.repeats) as done:
             for item in EXPERIMENTS:
-                played[item.number] = experiment(item, arenas[item.scene], config, seeds, eyes, done)
+                played[item.number] = experiment(item, arenas[item.scene], config, seeds, rig, done)
         with stage(console, "Table 1", of_table_1) as done:
-            table_1 = strategies(arenas, config, args.seed, eyes, done)
+            table_1 = strategies(arenas, config, args.seed, rig, done)
     with stage(console, "what cannot work", of_mishaps) as done:
         endings = mishaps(args.sensor, args.seed, done)
     table_2 = ()

@@ -42,7 +42,7 @@ def main(args: RunArgs) -> int:
         print(f"jaxbiped: warning: {args.scene}: {text}", file=sys.stderr)
     strategy = find_strategy(args.strategy)
     check_mission(args.mission)
-    with seeing(args.mission) as eyes:
+    with seeing(args.mission) as rig:
         print(
             f"{name}, {strategy.name}, sensor {args.mission.sensor}, executor {args.mission.executor}, seed {args.seed}"
         )
@@ -53,7 +53,7 @@ def main(args: RunArgs) -> int:
             strategy,
             noise_of(args.seed),
             lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
-            eyes,
+            rig,
         )
     with new_folder(out) as folder:
         title = f"{name}, {args.strategy}: {sentence(mission)}"

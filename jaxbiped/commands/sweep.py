@@ -13,7 +13,7 @@ from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
-from jaxbiped.mission.eyes import try_eyes
+from jaxbiped.mission.sensor_rig import try_rig
 from jaxbiped.report.folder_report import terminal_report, write_report
 from jaxbiped.study.batching import groups_of, shards, strategies_of
 from jaxbiped.study.components import fingerprinted
@@ -48,7 +48,7 @@ def main(args: SweepArgs) -> int:
         check_memory(group.static, len(group.points), len(group.strategies), arenas, queues)
     for point in points:
         check_mission(point.mission)
-    try_eyes(config.mission)
+    try_rig(config.mission)
     out = args.out or Path("results") / f"sweep-{config_hash(config)}"
     if not args.resume:
         refuse_taken(out)

@@ -14,10 +14,10 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.decision import DecisionTrace
-from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.log import MissionLog, Picture
 from jaxbiped.mission.mission_step import step
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.mission.snapshots import ground, marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
 from jaxbiped.mission.state import AgentState, WorldState, start
@@ -72,15 +72,15 @@ def run_logged(
     seed: UInt32[Array, ""],
     program: MissionSpec,
     on_decision: Callable[[Played], None] = lambda _: None,
-    eyes: Eyes | None = None,
+    rig: SensorRig | None = None,
 ) -> Mission:
     """Run one mission (no batch axis) like the compiled driver, and keep what the robot saw and thought.
 
     Args:
-      eyes: its sensor, if the program's sensor is not in JAX.
+      rig: its sensor, if the program's sensor is not in JAX.
     """
-    recorder = Recorder(settings, program, on_decision, eyes)
-    return recorder.mission(arena, run_bare(arena, settings, seed, program, eyes, recorder))
+    recorder = Recorder(settings, program, on_decision, rig)
+    return recorder.mission(arena, run_bare(arena, settings, seed, program, rig, recorder))
 
 
 @with_own_settings
@@ -89,14 +89,14 @@ def run_bare(
     settings: MissionParams,
     seed: UInt32[Array, ""],
     program: MissionSpec,
-    eyes: Eyes | None = None,
+    rig: SensorRig | None = None,
     recorder: Recorder | None = None,
 ) -> WorldState:
     """The end of one mission (no batch axis); its world has a leading axis of 1."""
     batch, (world, mind) = begin_once(arena, settings, seed, program)
     while np.asarray(world.code)[0] == Code.RUNNING:
         before = world
-        seen = eyes.see(world, mind, *batch) if eyes else None
+        seen = rig.see(world, mind, *batch) if rig else None
         world, mind, _, command, thought = turn_once(world, mind, *batch, program, seen)
         if recorder:
             recorder.decided(0, before, command, thought)
@@ -112,9 +112,9 @@ class Recorder:
         settings: MissionParams,
         program: MissionSpec,
         on_decision: Callable[[Played], None],
-        eyes: Eyes | None = None,
+        rig: SensorRig | None = None,
     ):
-        self.settings, self.program, self.on_decision, self.eyes = settings, program, on_decision, eyes
+        self.settings, self.program, self.on_decision, self.rig = settings, program, on_decision, rig
         self.moments: list[dict] = []
         self.pictures: list[Picture] = []
         self.played: list[Played] = []
@@ -125,7 +125,7 @@ class Recorder:
     def decided(self, _: int, world: WorldState, command: Command, thought: DecisionTrace) -> None:
         """Record one decision, before it is executed."""
         self.moments.append(moment(world, thought, self.settings, self.program, self.action))
-        if shot := self.eyes and self.eyes.picture():
+        if shot := self.rig and self.rig.picture():
             self.pictures.append(Picture(shot.left, shot.disparity))
         self.command = command
         self.walked.append([])

@@ -29,21 +29,21 @@ from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridSpec
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, ending, no_results, tally
 from jaxbiped.mission.decision import DecisionTrace
-from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.primitive_schedule import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
 from jaxbiped.mission.recorded_driver import Mission, Played, Recorder
+from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.simulated_step import (
     Plan,
     choose_rows,
+    decide_next,
     fresh,
     gather,
     judge,
-    judge_and_think,
+    judge_and_decide,
     no_plan,
     scatter,
-    think_on,
 )
 from jaxbiped.mission.stage import Stage
 from jaxbiped.mission.state import AgentState, BodyPose, WorldState, start
@@ -77,14 +77,14 @@ def walk(
     config: WalkConfig,
     on_progress: OnProgress = lambda tally: None,
     observer: Observer | None = None,
-    eyes: Eyes | None = None,
+    rig: SensorRig | None = None,
 ) -> Result:
     """Process a queue of missions; `program.executor` names the physics.
 
     Args:
       arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
       on_progress: called with the tally of the jobs.
-      eyes: the robots' sensor, if the program's sensor is not in JAX.
+      rig: the robots' sensor, if the program's sensor is not in JAX.
 
     Returns:
       Results in the order of the jobs, on the host; padding stays RUNNING.
@@ -93,7 +93,7 @@ def walk(
       InputError: a missing device, a biped that cannot play its primitives, or arenas with terrain.
     """
     refuse_terrain(arenas, f"executor {program.executor}")
-    return Walkers(arenas, settings, jobs, program, config, observer, eyes).work(on_progress)
+    return Walkers(arenas, settings, jobs, program, config, observer, rig).work(on_progress)
 
 
 @with_own_settings
@@ -104,7 +104,7 @@ def walk_logged(
     program: MissionSpec,
     config: WalkConfig,
     on_decision: Callable[[Played], None] = lambda _: None,
-    eyes: Eyes | None = None,
+    rig: SensorRig | None = None,
 ) -> Mission:
     """One mission of a simulated biped, with a log of everything, like `recorded_driver.run_logged`."""
     arenas, points, world = jax.tree.map(
@@ -112,9 +112,9 @@ def walk_logged(
         (arena, settings, start(arena, settings, seed, program.spec, program.localisation)[0]),
     )
     zero = jnp.zeros(1, jnp.int32)
-    recorder = Recorder(settings, program, on_decision, eyes)
+    recorder = Recorder(settings, program, on_decision, rig)
     jobs = Jobs(zero, zero, jnp.asarray(seed)[None], jnp.int32(1))
-    walk(arenas, points, jobs, program, config, observer=recorder, eyes=eyes)
+    walk(arenas, points, jobs, program, config, observer=recorder, rig=rig)
     return recorder.mission(arena, world)
 
 
@@ -144,9 +144,9 @@ def rehearse(config: MissionConfig) -> None:
 class Walkers:
     """The slots, and the queue that they process."""
 
-    def __init__(self, arenas, settings, jobs, program: MissionSpec, config: WalkConfig, observer=None, eyes=None):
+    def __init__(self, arenas, settings, jobs, program: MissionSpec, config: WalkConfig, observer=None, rig=None):
         self.arenas, self.settings, self.jobs = arenas, settings, jobs
-        self.program, self.config, self.observer, self.eyes = program, config, observer, eyes
+        self.program, self.config, self.observer, self.rig = program, config, observer, rig
         self.arena_of, self.point_of = np.asarray(jobs.arena), np.asarray(jobs.point)
         self.count = int(jobs.count)
         self.step, self.rise = np.asarray(settings.body.step), np.asarray(settings.limits.rise)
@@ -201,12 +201,12 @@ class Walkers:
         setting = gather(self.settings, self.point_of[self.job[rows]])
         ends = self.stage.fell[rows], self.stage.collided[rows]
         done = world, mind, plan, Pose(*feet)
-        if self.eyes:
+        if self.rig:
             world, moved, times = judge(*done, *ends, arena, setting, self.program)
-            seen = self.eyes.see(world, moved, arena, setting, carriage, len(ids))
-            mind, following, thought = think_on(world, moved, times, carriage, arena, setting, self.program, seen)
+            seen = self.rig.see(world, moved, arena, setting, carriage, len(ids))
+            mind, following, thought = decide_next(world, moved, times, carriage, arena, setting, self.program, seen)
         else:
-            world, moved, mind, following, thought = judge_and_think(
+            world, moved, mind, following, thought = judge_and_decide(
                 *done, carriage, *ends, arena, setting, self.program
             )
         mine = np.where(np.arange(ROWS) < len(ids), rows, len(self.job))

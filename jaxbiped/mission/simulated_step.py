@@ -75,7 +75,7 @@ def fresh(
 
 
 @partial(jax.jit, static_argnames=("program",))
-def judge_and_think(
+def judge_and_decide(
     world: WorldState,
     mind: AgentState,
     plan: Plan,
@@ -93,7 +93,7 @@ def judge_and_think(
       The world and the mind after the action; the mind after the next measurement; the next plan; the trace.
     """
     world, mind, times = judge(world, mind, plan, after, fell, collided, arena, settings, program)
-    return world, mind, *think_on(world, mind, times, carriage, arena, settings, program)
+    return world, mind, *decide_next(world, mind, times, carriage, arena, settings, program)
 
 
 @partial(jax.jit, static_argnames=("program",))
@@ -116,7 +116,7 @@ def judge(
     Returns:
       The world and the mind after the action; how many successive commands were hindered.
     """
-    executed = jax.vmap(carried_out)(world, plan.command, after, fell, collided, arena, settings)
+    executed = jax.vmap(execute)(world, plan.command, after, fell, collided, arena, settings)
     done = jax.vmap(apply_outcome, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
         world, mind, plan.command, plan.verdict, executed, arena, settings, program
     )
@@ -127,7 +127,7 @@ def judge(
 
 
 @partial(jax.jit, static_argnames=("program",))
-def think_on(
+def decide_next(
     world: WorldState,
     mind: AgentState,
     times: Int[Array, "n"],
@@ -188,7 +188,7 @@ def back_off(command: Command) -> Command:
     )
 
 
-def carried_out(
+def execute(
     world: WorldState,
     command: Command,
     after: Pose,

@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.arenas import Arena
-from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.mission.oracle import oracle_plan
+from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.reproduction.account import Record, record, typical
 from jaxbiped.reproduction.mishaps import MISHAPS, Ending, suffer
@@ -24,12 +24,12 @@ Done = Callable[[], None]  # called after each mission
 
 
 def experiment(
-    item: Experiment, arena: Arena, config: MissionConfig, seeds: range, eyes: Eyes | None, done: Done
+    item: Experiment, arena: Arena, config: MissionConfig, seeds: range, rig: SensorRig | None, done: Done
 ) -> tuple[tuple[Record, ...], Record, MissionLog]:
     """Play an experiment with several seeds: all its missions, the one to show, and that one's log."""
     records, logs = [], {}
     for seed in seeds:
-        mission = play(arena, config, item.strategy, seed, eyes)
+        mission = play(arena, config, item.strategy, seed, rig)
         records.append(record(item, item.strategy, seed, mission, config.durations))
         logs[seed] = mission.log
         best = typical(records)
@@ -38,13 +38,13 @@ def experiment(
 
 
 def strategies(
-    arenas: Mapping[str, Arena], config: MissionConfig, seed: int, eyes: Eyes | None, done: Done
+    arenas: Mapping[str, Arena], config: MissionConfig, seed: int, rig: SensorRig | None, done: Done
 ) -> dict[tuple[str, str], Shown]:
     """Play each strategy in each test scene of Table 1."""
     found = {}
     for scene, kinds in SCENES.items():
         for name in TABLE_1:
-            found[name, scene] = shown(arenas[scene], play(arenas[scene], config, name, seed, eyes), config, kinds)
+            found[name, scene] = shown(arenas[scene], play(arenas[scene], config, name, seed, rig), config, kinds)
             done()
     return found
 
@@ -52,9 +52,9 @@ def strategies(
 def mishaps(sensor: str, seed: int, done: Done) -> tuple[Ending, ...]:
     """Play each mission that cannot succeed."""
     config, found = MissionConfig(sensor=sensor), []
-    with seeing(config) as eyes:
+    with seeing(config) as rig:
         for mishap in MISHAPS:
-            found.append(suffer(mishap, config, seed, eyes))
+            found.append(suffer(mishap, config, seed, rig))
             done()
     return tuple(found)
 

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from jaxbiped.arenas import Arena, SceneConfig, to_arena
-from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.recorded_driver import Mission
+from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.reproduction.staging import play, play_changing
 
@@ -83,9 +83,9 @@ def scene_of(mishap: Mishap, boxes: tuple[dict, ...]) -> SceneConfig:
     return SceneConfig.model_validate(scene | {"boxes": held, "landmarks": mishap.landmarks})
 
 
-def suffer(mishap: Mishap, config: MissionConfig, seed: int, eyes: Eyes | None = None) -> Ending:
+def suffer(mishap: Mishap, config: MissionConfig, seed: int, rig: SensorRig | None = None) -> Ending:
     """Play one; `config` must not be for a simulated biped."""
     arena_at = arena_of(mishap)
     if mishap.dropped:
-        return Ending(mishap, play_changing(arena_at, config, "full", seed, eyes))
-    return Ending(mishap, play(arena_at(0), config, "full", seed, eyes))
+        return Ending(mishap, play_changing(arena_at, config, "full", seed, rig))
+    return Ending(mishap, play(arena_at(0), config, "full", seed, rig))

@@ -17,9 +17,9 @@ from jaxbiped.core.names import MOVING
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.execution import find_executor
-from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.metric import Metric, column_of, find_metric
 from jaxbiped.mission.primitive_schedule import WalkConfig
+from jaxbiped.mission.sensor_rig import RENDERED
 from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy

@@ -12,7 +12,7 @@ import numpy as np
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.config import field_docs
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.eyes import StereoEyes, where
+from jaxbiped.mission.sensor_rig import StereoRig, where
 from jaxbiped.mission.settings import MissionConfig, MissionParams, program
 from jaxbiped.sensing.camera import Mount
 from jaxbiped.sensing.config import CameraConfig, LandmarkConfig
@@ -44,9 +44,7 @@ class Fit:
     same: float  # share of the fused cells on which the fitted ray-cast sensor agrees with rendered pairs
 
 
-def fit(
-    places: Sequence[Place], eyes: StereoEyes, config: MissionConfig, tell: Callable[[], None] = lambda: None
-) -> Fit:
+def fit(places: Sequence[Place], rig: StereoRig, config: MissionConfig, tell: Callable[[], None] = lambda: None) -> Fit:
     """Evaluate the matcher and the landmark detector in all places, and fit the models of both.
 
     Args:
@@ -57,16 +55,16 @@ def fit(
     watched, sights, count = [], [], 0
     for place in places:
         count += len(place.poses)
-        sights += [one for n in range(len(place.poses)) for one in landmarks_of(place, n, eyes, settings, config)]
+        sights += [one for n in range(len(place.poses)) for one in landmarks_of(place, n, rig, settings, config)]
         bare = replace(place, arena=unmarked(place.arena))
         for n in range(len(place.poses)):
-            watched.append(watch_from(bare, n, eyes, settings, config))
+            watched.append(watch_from(bare, n, rig, settings, config))
             tell()
-    least, plain = least_contrast(places, eyes, settings, config)
+    least, plain = least_contrast(places, rig, settings, config)
     seen = together(watched)
     stereo = fit_noise(seen, config.stereo).model_copy(update={"min_contrast": round(least, 4)})
     marks = fit_landmarks(sights, config.landmarks)
-    cast, same = fewest_rays(places, eyes, config.model_copy(update={"stereo": stereo, "landmarks": marks}))
+    cast, same = fewest_rays(places, rig, config.model_copy(update={"stereo": stereo, "landmarks": marks}))
     return Fit(
         SensorConfig(stereo=stereo, landmarks=marks, rays=cast), quality(seen), plain, tuple(sights), count, same
     )
@@ -82,13 +80,13 @@ def choices(camera: CameraConfig) -> list[RayConfig]:
     ]
 
 
-def fewest_rays(places: Sequence[Place], eyes: StereoEyes, config: MissionConfig) -> tuple[RayConfig, float]:
+def fewest_rays(places: Sequence[Place], rig: StereoRig, config: MissionConfig) -> tuple[RayConfig, float]:
     """The fewest rays with which `ALIKE` of the cells agree with rendered pairs (else the most), and their share.
 
     Args:
       config: config of the missions that see rendered pairs, with the fitted noise.
     """
-    stereo = np.stack([fused(place, looking(config, eyes), config)[0] for place in places])
+    stereo = np.stack([fused(place, looking(config, rig), config)[0] for place in places])
     for rays in choices(config.camera):
         how = with_rays(config, rays)
         same, _ = agreement(stereo, np.stack([fused(place, looking(how, None), how)[0] for place in places]))
@@ -108,22 +106,22 @@ def eye(
     return origin, basis, at, int(drawn)
 
 
-def watch_from(place: Place, number: int, eyes: StereoEyes, settings: MissionParams, config: MissionConfig) -> Watched:
+def watch_from(place: Place, number: int, rig: StereoRig, settings: MissionParams, config: MissionConfig) -> Watched:
     """Evaluate the matcher in one view."""
     origin, basis, _, seed = eye(place, number, settings, config)
-    eyes.sensor.show(place.arena)
-    return watch(eyes.sensor, origin, basis, int(seed))
+    rig.sensor.show(place.arena)
+    return watch(rig.sensor, origin, basis, int(seed))
 
 
 def landmarks_of(
-    place: Place, number: int, eyes: StereoEyes, settings: MissionParams, config: MissionConfig
+    place: Place, number: int, rig: StereoRig, settings: MissionParams, config: MissionConfig
 ) -> list[Sight]:
     """Landmarks in view of both cameras, found or not."""
     pose = place.poses[number]
     batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
     seed = jnp.asarray(place.seed, jnp.uint32)[None]
     world, mind = standing(*batch, seed, pose, jnp.int32(number), program(config, AREA))
-    _, found = eyes.see(world, mind, *batch)
+    _, found = rig.see(world, mind, *batch)
     there = in_view(place.arena, pose, settings, config)
     sights = []
     for n in np.flatnonzero(there.seen):
@@ -144,7 +142,7 @@ sight_all = jax.jit(sight, static_argnames=("image",))
 
 
 def least_contrast(
-    places: Sequence[Place], eyes: StereoEyes, settings: MissionParams, config: MissionConfig
+    places: Sequence[Place], rig: StereoRig, settings: MissionParams, config: MissionConfig
 ) -> tuple[float, float]:
     """Contrast at which half as much is measured as at `CONTRASTS[-1]`; and the share that is measured at none."""
     shares = []
@@ -158,7 +156,7 @@ def least_contrast(
                 floor_contrast=np.float32(contrast),
             )
             for n in range(min(CONTRAST_VIEWS, len(place.poses))):
-                seen.append(watch_from(replace(place, arena=even), n, eyes, settings, config))
+                seen.append(watch_from(replace(place, arena=even), n, rig, settings, config))
         w = together(seen)
         shares.append(share(w.found > 0, w.common & ~w.near & w.inner))
     risen = np.maximum.accumulate(shares) + 1e-9 * np.arange(len(shares))

@@ -15,10 +15,10 @@ from jaxtyping import Array, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, ending, no_results
-from jaxbiped.mission.eyes import Eyes, StereoEyes
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_bare
+from jaxbiped.mission.sensor_rig import SensorRig, StereoRig
 from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.sensing.config import CameraConfig
 
@@ -31,17 +31,17 @@ def run_on_host(
     count: int,
     static: MissionSpec,
     on_progress: OnProgress,
-    open_eyes: Callable[[], AbstractContextManager[Eyes]],
+    open_rig: Callable[[], AbstractContextManager[SensorRig]],
     population_of: Int[np.ndarray, "P"],
     workers: int = 2,
 ) -> Result:
-    """As `queues.run_all`, for a sensor that measures on the host: each worker is a thread with its own eyes.
+    """As `queues.run_all`, for a sensor that measures on the host: each worker is a thread with its own rig.
 
     OpenGL and OpenCV run while the other thread has the interpreter. Which worker plays a mission does not change its
     result.
 
     Args:
-      open_eyes: creates eyes in the thread that uses them, and closes them there.
+      open_rig: creates a rig in the thread that uses it, and closes it there.
       workers: by default one for each core; OpenGL and OpenCV have additional threads.
     """
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
@@ -54,7 +54,7 @@ def run_on_host(
         nonlocal done
         with contextlib.ExitStack() as stack:
             with lock:
-                eyes = stack.enter_context(open_eyes())
+                rig = stack.enter_context(open_rig())
             while not stop.is_set():
                 with lock:
                     job = next(left, None)
@@ -65,7 +65,7 @@ def run_on_host(
                     jax.tree.map(lambda leaf, row=row: leaf[row], tree)
                     for tree, row in ((batch, size * population_of[point] + arena_number), (points, point))
                 )
-                world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, eyes))
+                world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, rig))
                 last = jax.device_get(ending(world, arena.goal_xy))
                 with lock:
                     for column, value in zip(jax.tree.leaves(out), jax.tree.leaves(last), strict=True):
@@ -89,6 +89,6 @@ def run_on_host(
     return out
 
 
-def open_eyes(camera: CameraConfig, localisation: str) -> contextlib.closing[StereoEyes]:
+def open_rig(camera: CameraConfig, localisation: str) -> contextlib.closing[StereoRig]:
     """Rendered stereo, until it is closed; both in the thread that uses it."""
-    return contextlib.closing(StereoEyes(camera, localisation))
+    return contextlib.closing(StereoRig(camera, localisation))

@@ -117,14 +117,14 @@ def play_again(
     families = families_again(manifest, families)
     check_mission(config)
     key, played = jax.random.key(manifest.seed), {}
-    with seeing(config) as eyes:
+    with seeing(config) as rig:
         for kind in kinds_of(families):
             mine = np.array([k for k in arenas if k % kind.number in kind.places], int)
             if len(mine):
                 batch, seeds = draw(key, jnp.asarray(mine), kind.families, populations, jnp.asarray(kind.turns(mine)))
                 for row, k in enumerate(mine):
                     arena = jax.tree.map(lambda leaf, row=row: leaf[row], batch)
-                    played[int(k)] = play_one(arena, config, again, seeds[row], eyes=eyes, numbers=numbers)
+                    played[int(k)] = play_one(arena, config, again, seeds[row], rig=rig, numbers=numbers)
     return [played[int(k)] for k in arenas]
 
 

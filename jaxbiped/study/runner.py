@@ -15,8 +15,8 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.component import traced_component, with_numbers
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.mission.batched_driver import Result
-from jaxbiped.mission.eyes import Eyes, eyes_for
 from jaxbiped.mission.recorded_driver import Mission, Played, run_logged
+from jaxbiped.mission.sensor_rig import SensorRig, rig_for
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.mission.terrain_check import program_for
@@ -53,14 +53,14 @@ def check_mission(config: MissionConfig) -> None:
 
 
 @contextlib.contextmanager
-def seeing(config: MissionConfig) -> Iterator[Eyes | None]:
+def seeing(config: MissionConfig) -> Iterator[SensorRig | None]:
     """What missions of a config see with on the host, closed on exit; None if their sensor is in JAX."""
-    eyes = eyes_for(config)
+    rig = rig_for(config)
     try:
-        yield eyes
+        yield rig
     finally:
-        if eyes:
-            eyes.close()
+        if rig:
+            rig.close()
 
 
 def play_one(
@@ -69,14 +69,14 @@ def play_one(
     strategy: str | Strategy,
     noise: UInt32[Array, ""],
     on_decision: Callable[[Played], None] = lambda _: None,
-    eyes: Eyes | None = None,
+    rig: SensorRig | None = None,
     numbers: Mapping[str, float] | None = None,
 ) -> Mission:
     """Play one mission as a study would, with a log of everything.
 
     Args:
       noise: seed of all its noise.
-      eyes: from `seeing`, if the sensor measures on the host.
+      rig: from `seeing`, if the sensor measures on the host.
       numbers: numbers of components, instead of their defaults, such as `{"planner.clearance": 0.1}`.
 
     Raises:
@@ -87,8 +87,8 @@ def play_one(
     if config.executor in SIMULATED:
         from jaxbiped.mission.simulated_driver import walk_logged  # loads MuJoCo
 
-        return walk_logged(*arguments, config=config.walk, on_decision=on_decision, eyes=eyes)
-    return run_logged(*arguments, on_decision=on_decision, eyes=eyes)
+        return walk_logged(*arguments, config=config.walk, on_decision=on_decision, rig=rig)
+    return run_logged(*arguments, on_decision=on_decision, rig=rig)
 
 
 def numbered(settings: MissionParams, strategy: str | Strategy, numbers: Mapping[str, float]) -> MissionParams:
@@ -106,16 +106,16 @@ def numbered(settings: MissionParams, strategy: str | Strategy, numbers: Mapping
 @contextlib.contextmanager
 def batch_driver(group: Group, workers: int) -> Iterator[Callable[..., Result]]:
     """What plays the missions of a group: a function with the arguments of `queues.run_all`."""
-    from jaxbiped.study.hosted import open_eyes, run_on_host
+    from jaxbiped.study.hosted import open_rig, run_on_host
     from jaxbiped.study.queues import run_all
 
     with contextlib.ExitStack() as stack:
-        see = partial(open_eyes, group.camera, group.static.localisation) if group.camera else None
+        see = partial(open_rig, group.camera, group.static.localisation) if group.camera else None
         if group.walk is not None:
             from jaxbiped.study.walks import walk_all  # loads MuJoCo
 
-            yield partial(walk_all, config=group.walk, eyes=stack.enter_context(see()) if see else None)
+            yield partial(walk_all, config=group.walk, rig=stack.enter_context(see()) if see else None)
         elif see:
-            yield partial(run_on_host, open_eyes=see, workers=workers)
+            yield partial(run_on_host, open_rig=see, workers=workers)
         else:
             yield partial(run_all, workers=workers)

@@ -18,10 +18,10 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
-from jaxbiped.mission.eyes import Eyes
 from jaxbiped.mission.mission_step import sense
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_bare
+from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.settings import MissionConfig, MissionParams, MissionSpec, program
 from jaxbiped.mission.state import AgentState, WorldState, start
 from jaxbiped.sensing.presets import RayConfig
@@ -92,10 +92,10 @@ def aimed(
 Look = Callable[[Place, Pose, int], View]
 
 
-def looking(config: MissionConfig, eyes: Eyes | None) -> Look:
+def looking(config: MissionConfig, rig: SensorRig | None) -> Look:
     """The view of a robot at a known place: a function of the world, the place and the number of the view."""
     settings, static = config.settings("full"), program(config, AREA)
-    measure = eyes.see if eyes else partial(measured, program=static)
+    measure = rig.see if rig else partial(measured, program=static)
 
     def look(world: Place, pose: Pose, number: int) -> View:
         batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (world.arena, settings))
@@ -159,10 +159,10 @@ class Outcome:
 
 
 @with_own_settings
-def mission(world: Place, config: MissionConfig, eyes: Eyes | None) -> Outcome:
+def mission(world: Place, config: MissionConfig, rig: SensorRig | None) -> Outcome:
     """One mission of strategy `full` in a world."""
     arena, settings = jax.tree.map(jnp.asarray, (world.arena, config.settings("full")))
-    end = run_bare(arena, settings, jnp.uint32(world.seed), program(config, AREA), eyes)
+    end = run_bare(arena, settings, jnp.uint32(world.seed), program(config, AREA), rig)
     return Outcome(Code(int(end.code[0])), float(end.distance[0]), float(end.time[0]))
 
 

@@ -26,7 +26,7 @@ from statsmodels.stats.proportion import proportion_confint
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.localisation.kalman_filter import Belief, correct
 from jaxbiped.mapping import Cell
-from jaxbiped.mission.eyes import StereoEyes
+from jaxbiped.mission.sensor_rig import StereoRig
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import RayConfig
@@ -58,13 +58,13 @@ OTHER_NOISE = 0x5BD1E995  # of another mission in the same arena
 update = jax.jit(correct)
 
 
-def matcher(places, eyes, config) -> None:
+def matcher(places, rig, config) -> None:
     """Disparities of textured and of plain surfaces against the renderer's depth."""
     settings = config.settings("full")
     bare = [replace(place, arena=unmarked(place.arena)) for place in places]
-    watched = [watch_from(place, n, eyes, settings, config) for place in bare for n in range(len(place.poses))]
+    watched = [watch_from(place, n, rig, settings, config) for place in bare for n in range(len(place.poses))]
     q = quality(together(watched))
-    _, plain = least_contrast(places, eyes, settings, config)
+    _, plain = least_contrast(places, rig, settings, config)
     print(f"matcher   bias {q.bias:+.3f} px (wanted: below 0.1), {q.measured:.3f} of what both cameras see measured "
           f"(0.85), {q.wrong:.4f} of that beyond 1 px; {plain:.4f} of plain surfaces measured (none)")  # fmt: skip
 
@@ -119,7 +119,7 @@ def gates(found, true) -> None:
     print(f"gates     in {count} of {len(true)} arenas: {', '.join(told)} (wanted: 0.95, 0.90)")
 
 
-def poses(places, eyes, config) -> None:
+def poses(places, rig, config) -> None:
     """Poses of robots that are a little lost, after one view with two or more landmarks."""
     settings, static = config.settings("full"), program(config, AREA)
     rng = np.random.default_rng(0)
@@ -132,7 +132,7 @@ def poses(places, eyes, config) -> None:
             error = rng.normal(0, LOST).astype(np.float32)
             lost = replace(pose, x=pose.x + error[0], y=pose.y + error[1], yaw=pose.yaw + error[2])
             lost = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], lost)
-            _, found = eyes.see(world, replace(mind, belief=replace(mind.belief, pose=lost)), *batch)
+            _, found = rig.see(world, replace(mind, belief=replace(mind.belief, pose=lost)), *batch)
             views += 1
             if found.seen.sum() >= 2:
                 belief = Belief(jax.tree.map(lambda leaf: leaf[0], lost), jnp.diag(jnp.square(jnp.array(LOST))))
@@ -182,8 +182,8 @@ def by_pictures(places, config) -> list[Outcome]:
     """Missions with rendered pairs, `AT_ONCE` of them at once: a thread each, and what it renders with."""
 
     def every(first: int) -> list[Outcome]:
-        with contextlib.closing(StereoEyes(config.camera)) as eyes:
-            return [mission(place, config, eyes) for place in places[first::AT_ONCE]]
+        with contextlib.closing(StereoRig(config.camera)) as rig:
+            return [mission(place, config, rig) for place in places[first::AT_ONCE]]
 
     ended: list = [None] * len(places)
     with ThreadPoolExecutor(AT_ONCE) as pool:
@@ -199,9 +199,9 @@ def ending_alike(first, second, lost: bool = True) -> str:
     return f"{count} of {of} ({count / of:.1%} [{low:.1%}, {high:.1%}])"
 
 
-def speed(place, eyes, config) -> None:
+def speed(place, rig, config) -> None:
     """Time of one measurement, by its parts."""
-    sensor, settings = eyes.sensor, config.settings("full")
+    sensor, settings = rig.sensor, config.settings("full")
     origin, basis, at, seed = eye(place, 0, settings, config)
     sensor.show(place.arena)
     pair = sensor.renderer.pair(origin, basis, sensor.camera.image_noise, int(seed))
@@ -240,13 +240,13 @@ def flight(places, config) -> None:
     settings, begin = config.settings("full"), threading.Barrier(len(places) + 1)
 
     def measure(place) -> None:
-        with contextlib.closing(StereoEyes(config.camera)) as eyes:
+        with contextlib.closing(StereoRig(config.camera)) as rig:
             origin, basis, at, seed = eye(place, 0, settings, config)
             rest = at, place.poses[0], 2.0, jax.device_get(settings.landmarks)
-            eyes.sensor(place.arena, origin, basis, *rest, seed)
+            rig.sensor(place.arena, origin, basis, *rest, seed)
             begin.wait()
             for n in range(REPEATS):
-                eyes.sensor(place.arena, origin, basis, *rest, n)
+                rig.sensor(place.arena, origin, basis, *rest, n)
 
     threads = [threading.Thread(target=measure, args=(place,)) for place in places]
     for thread in threads:
@@ -272,15 +272,15 @@ def main() -> None:
     )
     options = parser.parse_args()
     config = MissionConfig(sensor="stereo", preset=str(options.preset))
-    with contextlib.closing(StereoEyes(config.camera)) as eyes:
+    with contextlib.closing(StereoRig(config.camera)) as rig:
         every = list(worlds(SEED, options.first, max(options.arenas, options.missions), options.views, config))
         places = every[: options.arenas]
-        speed(places[0], eyes, config)
+        speed(places[0], rig, config)
         flight(places[:AT_ONCE], config)
-        look = remembered(looking(config, eyes))
+        look = remembered(looking(config, rig))
         maps(places, look, config)
-        matcher(places, eyes, config)
-        poses(places, eyes, config)
+        matcher(places, rig, config)
+        poses(places, rig, config)
         sensors(places, look, config)
     if options.missions:
         missions(every[: options.missions], config, options.first)

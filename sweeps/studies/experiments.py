@@ -22,12 +22,12 @@ from rich.table import Table
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.sensor_rig import RENDERED
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.sensing.counter_rng import from_key
-from jaxbiped.study.hosted import open_eyes, run_on_host
+from jaxbiped.study.hosted import open_rig, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
 
@@ -43,10 +43,10 @@ def play(item: Experiment, config: MissionConfig, seeds: int):
     points = stack([config.settings(item.strategy)])
     arguments = batch, noise, points, seeds, static, lambda _: None
     one = np.zeros(1, int)
-    see = partial(open_eyes, config.camera, config.localisation) if config.sensor in RENDERED else None
+    see = partial(open_rig, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
-        with see() if see else contextlib.nullcontext() as eyes:
-            result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
+        with see() if see else contextlib.nullcontext() as rig:
+            result = walk_all(*arguments, config.walk, population_of=one, rig=rig)
     elif see:
         result = run_on_host(*arguments, see, population_of=one)
     else:

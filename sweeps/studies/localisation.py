@@ -27,14 +27,14 @@ from rich.table import Table
 from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.mission.batched_driver import Result, stack
-from jaxbiped.mission.eyes import RENDERED
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.sensor_rig import RENDERED
 from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.paired import success_difference
 from jaxbiped.study.evaluation import draw
-from jaxbiped.study.hosted import open_eyes, run_on_host
+from jaxbiped.study.hosted import open_rig, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
 
@@ -47,10 +47,10 @@ def play(config: MissionConfig, batch, seeds, count: int, strategy: str) -> Resu
     static = program(config, (SIZE_X, SIZE_Y))
     points, one = stack([config.settings(strategy)]), np.zeros(1, int)
     arguments = batch, seeds, points, count, static, lambda _: None
-    see = partial(open_eyes, config.camera, config.localisation) if config.sensor in RENDERED else None
+    see = partial(open_rig, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
-        with see() if see else contextlib.nullcontext() as eyes:
-            result = walk_all(*arguments, config.walk, population_of=one, eyes=eyes)
+        with see() if see else contextlib.nullcontext() as rig:
+            result = walk_all(*arguments, config.walk, population_of=one, rig=rig)
     elif see:
         result = run_on_host(*arguments, see, population_of=one)
     else:

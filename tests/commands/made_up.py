@@ -89,14 +89,14 @@ def a_pair(here, monkeypatch):
 
 
 def a_fit(here, monkeypatch):
-    class Eyes:
+    class SensorRig:
         def __init__(self, camera: CameraConfig):
             pass
 
         def close(self):
             pass
 
-    made = {"StereoEyes": Eyes, "worlds": lambda *_: iter(()), "fit": lambda *_: object.__new__(Fit)}
+    made = {"StereoRig": SensorRig, "worlds": lambda *_: iter(()), "fit": lambda *_: object.__new__(Fit)}
     made |= {"sentences": lambda *_: ["matcher"], "compared": lambda *_: ["maps"]}
     made["sensor_toml"] = lambda _, heading: "\n".join(f"# {line}" for line in heading)
     for name, value in made.items():

@@ -12,10 +12,10 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation import predict
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.eyes import eyes_for, view_names
 from jaxbiped.mission.localising import carried_on, localise, unmarked
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_bare
+from jaxbiped.mission.sensor_rig import rig_for, view_names
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.state import start
 from jaxbiped.sensing import Motion, Sightings, View
@@ -133,10 +133,10 @@ def plain(arena):
 def test_missions_where_nothing_can_be_seen_end(arena, sensor, way):
     """Without texture nothing is measured: no path is found, and the numbers stay numbers."""
     settings, static = kind(way, sensor=sensor)
-    eyes = eyes_for(MissionConfig(localisation=way, sensor=sensor))
-    world = run_bare(plain(arena), settings, from_key(jax.random.key(0)), static, eyes)
-    if eyes:
-        eyes.close()
+    rig = rig_for(MissionConfig(localisation=way, sensor=sensor))
+    world = run_bare(plain(arena), settings, from_key(jax.random.key(0)), static, rig)
+    if rig:
+        rig.close()
     assert world.code[0] in (Code.NO_PATH, Code.REACHED, Code.COLLIDED, Code.OUT_OF_STEPS)
     assert np.isfinite(world.pose_error[0] + world.yaw_error[0])
 

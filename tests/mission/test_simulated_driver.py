@@ -15,7 +15,7 @@ from jaxbiped.mission.metrics import Energy
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.mission.simulated_driver import walk, walk_logged
-from jaxbiped.mission.simulated_step import carried_out
+from jaxbiped.mission.simulated_step import execute
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing.config import CameraConfig
@@ -139,13 +139,13 @@ def test_odometry_counts_what_really_happened():
     no = jnp.zeros((), bool)
     command = Command(jnp.float32(0), jnp.int32(1), jnp.float32(0.05), jnp.int32(0), no, jnp.float32(0))
     settings = replace(SETTINGS, odometry=jax.tree.map(jnp.zeros_like, SETTINGS.odometry))  # exact
-    executed = carried_out(world, command, after, no, no, AHEAD, settings)
+    executed = execute(world, command, after, no, no, AHEAD, settings)
     np.testing.assert_allclose(executed.moved, [0.05, 0.01, 0.2], atol=1e-6)
     assert float(executed.distance) == pytest.approx(np.hypot(0.05, 0.01))
     assert float(executed.time) == 16.0  # Table 2's
     assert not bool(executed.outside)
     beyond = replace(after, x=jnp.float32(SIZE[0] + 0.01))
-    assert bool(carried_out(world, command, beyond, no, no, AHEAD, settings).outside)
+    assert bool(execute(world, command, beyond, no, no, AHEAD, settings).outside)
 
 
 def test_a_gpu_that_is_not_there_is_an_input_error():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxbiped.mission.eyes import StereoEyes
+from jaxbiped.mission.sensor_rig import StereoRig
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.study import fitting
@@ -37,7 +37,7 @@ def test_as_few_rays_as_come_close_enough_and_else_the_most(monkeypatch, wrong, 
         return np.where(np.arange(1000).reshape(25, 40) < count, 4, 1).astype(np.int8), None
 
     monkeypatch.setattr(fitting, "fused", pretend)
-    monkeypatch.setattr(fitting, "looking", lambda config, eyes: None)
-    places, eyes = [object.__new__(Place)] * 2, object.__new__(StereoEyes)  # nobody looks at these
-    rays, same = fewest_rays(places, eyes, MissionConfig(sensor="stereo"))
+    monkeypatch.setattr(fitting, "looking", lambda config, rig: None)
+    places, rig = [object.__new__(Place)] * 2, object.__new__(StereoRig)  # nobody looks at these
+    rays, same = fewest_rays(places, rig, MissionConfig(sensor="stereo"))
     assert (rays.columns, rays.rows) == wanted and same == pytest.approx(1 - differ[wanted] / 1000)

@@ -25,7 +25,7 @@ from jaxbiped.sensing.view import Sightings, View
 
 
 @runtime_checkable
-class Eyes(Protocol):
+class SensorRig(Protocol):
     """The sensor of robots that are stepped on the host."""
 
     def see(
@@ -50,7 +50,7 @@ class Eyes(Protocol):
         ...
 
 
-class StereoEyes:
+class StereoRig:
     """The sensor `stereo` for the robots of one process; to be used, and closed, in the thread that created it."""
 
     def __init__(self, camera: CameraConfig, localisation: str = "landmarks"):
@@ -80,7 +80,7 @@ class StereoEyes:
         carriage: BodyPose | None = None,
         count: int | None = None,
     ) -> tuple[View, Sightings]:
-        """See `Eyes`; padding gets the values of the last row before it."""
+        """See `SensorRig`; padding gets the values of the last row before it."""
         placing = jax.device_get((where(world, mind, settings, carriage), mind.belief.pose, settings.stereo.max_range))
         arena, spread = jax.device_get((arena, settings.landmarks))
         if not self.marked:
@@ -100,7 +100,7 @@ class StereoEyes:
         return jax.tree.map(lambda *rows: np.stack(rows), *seen)
 
     def picture(self) -> Shot | None:
-        """See `Eyes`."""
+        """See `SensorRig`."""
         return self.last
 
     def close(self) -> None:
@@ -108,19 +108,19 @@ class StereoEyes:
         self.sensor.close()
 
 
-def eyes_for(config: MissionConfig) -> StereoEyes | None:
+def rig_for(config: MissionConfig) -> StereoRig | None:
     """The host sensor of missions with this config; None if their sensor is in JAX."""
-    return StereoEyes(config.camera, config.localisation) if config.sensor in RENDERED else None
+    return StereoRig(config.camera, config.localisation) if config.sensor in RENDERED else None
 
 
-def try_eyes(config: MissionConfig) -> None:
+def try_rig(config: MissionConfig) -> None:
     """Reject, before anything is printed or written, a sensor that does not work on this machine.
 
     Raises:
       InputError: nothing can be rendered here.
     """
-    if eyes := eyes_for(config):
-        eyes.close()
+    if rig := rig_for(config):
+        rig.close()
 
 
 @jax.jit

@@ -12,8 +12,8 @@ import pytest
 from jaxbiped.arenas.scene import load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.eyes import eyes_for, where
 from jaxbiped.mission.mission_step import sense, step
+from jaxbiped.mission.sensor_rig import rig_for, where
 from jaxbiped.mission.sensors import RayCast
 from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.state import start
@@ -25,7 +25,7 @@ by_ray_cast = jax.jit(jax.vmap(partial(sense, program=PROGRAM, carriage=None)))
 
 
 class Mirror:
-    """Eyes that measure on the host what the ray-cast sensor would inside the loop."""
+    """SensorRig that measure on the host what the ray-cast sensor would inside the loop."""
 
     def see(self, world, mind, arena, settings, carriage=None, count=None):
         return jax.device_get(by_ray_cast(world, mind, arena, settings))
@@ -85,7 +85,7 @@ def test_rendered_stereo_has_a_rule_for_far_walls_of_its_own():
 
 
 def test_jax_sensors_need_no_eyes():
-    assert eyes_for(CONFIG) is None and eyes_for(MissionConfig(sensor="oracle")) is None
+    assert rig_for(CONFIG) is None and rig_for(MissionConfig(sensor="oracle")) is None
 
 
 @pytest.fixture(scope="module")
@@ -110,12 +110,12 @@ def test_camera_is_where_the_ray_cast_sensor_has_it(first_look):
 
 def test_rendered_view_agrees_with_the_ray_cast_one(first_look):
     """Heights of the floor and the walls, as both sensors see them in one place with the same tilt."""
-    eyes = eyes_for(MissionConfig(sensor="stereo"))
+    rig = rig_for(MissionConfig(sensor="stereo"))
     try:
-        seen, _ = eyes.see(*first_look)
-        again, _ = eyes.see(*first_look)
+        seen, _ = rig.see(*first_look)
+        again, _ = rig.see(*first_look)
     finally:
-        eyes.close()
+        rig.close()
     world, mind, arena, settings = first_look
     cast, _ = by_ray_cast(world, mind, arena, replace(settings, sensor=RayCast()))
     assert np.array_equal(seen.z, again.z)
