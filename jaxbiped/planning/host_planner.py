@@ -19,11 +19,9 @@ from jaxbiped.core.host_callback import host_call
 from jaxbiped.core.time_limit import TimeLimit, within
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.planning.costs import DIRECTIONS, Costs
+from jaxbiped.planning.costs import Costs
+from jaxbiped.planning.path_check import read_ways
 from jaxbiped.planning.planners import FAILED, FINE, TOO_SLOW, Planner, Problem, Route
-
-DIRECTION_OF = {tuple(int(d) for d in move): k for k, move in enumerate(DIRECTIONS)}
-DIAGONAL = np.sqrt(2.0)
 
 MapPlanner = Callable[[np.ndarray, np.ndarray, tuple[int, int], tuple[int, int], Costs], Any]
 
@@ -139,30 +137,25 @@ def number_of(function: MapPlanner, limit: float) -> int:
 def answer(classes, levels, start, goal, costs, rules, active, numbers):
     """The routes of a batch, each by the function of its index: moves, costs, seconds and faults."""
     count, length = len(start), 3 * sum(classes.shape[1:])
-    moves = np.full((count, length), -1, np.int8)
-    cost, seconds = np.full(count, np.nan, np.float32), np.zeros(count, np.float32)
-    fault = np.full(count, FINE, np.int8)
-    for k in np.flatnonzero(active):
+    seconds, fault = np.zeros(count, np.float32), np.full(count, FINE, np.int8)
+    grids = passable(classes, rules)
+    given, raised = grids.copy(), levels.copy()  # of which functions may do what they like
+    starts, goals, own = start.tolist(), goal.tolist(), [Costs(*row) for row in costs.tolist()]
+    ways: list[Any] = [None] * count
+    for k in np.flatnonzero(active).tolist():
         function, limit = FUNCTIONS[numbers[k]]
-        cutting, bumps, gates = (bool(flag) for flag in rules[k])
-        grid = dared(classes[k], bumps, gates)
-        own = Costs(*(float(value) for value in costs[k]))
         begun = time.perf_counter()
-        fault[k], way = call(function, limit, grid.copy(), levels[k].copy(), start[k], goal[k], own)
+        fault[k], ways[k] = call(function, limit, given[k], raised[k], tuple(starts[k]), tuple(goals[k]), own[k])
         seconds[k] = time.perf_counter() - begun
-        if way is not None:
-            try:
-                found, cost[k] = read_way(way, grid, levels[k], start[k], goal[k], own, cutting)
-                moves[k, : min(length, len(found))] = found[:length]
-            except Exception as error:  # also from converting its result to an array
-                fault[k] = FAILED
-                tell(function, str(error))
+    moves, cost, wrong = read_ways(ways, grids, levels, start, goal, costs, rules[:, 0], length)
+    for k, message in wrong.items():
+        fault[k] = FAILED
+        tell(FUNCTIONS[numbers[k]][0], message)
     return moves, cost, seconds, fault
 
 
 def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs: Costs) -> tuple[int, Any]:
     """The fault of one call, and the value returned."""
-    start, goal = (tuple(int(v) for v in cell) for cell in (start, goal))
     try:
         return FINE, within(limit, function, classes, levels, start, goal, costs)
     except TimeLimit:
@@ -176,53 +169,13 @@ def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs
         return FAILED, None
 
 
-def dared(classes: np.ndarray, bumps: bool, gates: bool) -> np.ndarray:
-    """A copy of a map on which cells that must not be crossed are obstacles."""
-    grid = classes.copy()
-    if not bumps:
-        grid[grid == Cell.BUMP] = Cell.OBSTACLE
-    if not gates:
-        grid[grid == Cell.GATE] = Cell.OBSTACLE
-    return grid
-
-
-def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> tuple[np.ndarray, float]:
-    """The moves of a path, and its cost by Eq. 1.
-
-    Raises:
-      ValueError: what is wrong with the path.
-    """
-    cells = np.asarray(way)
-    if cells.ndim != 2 or cells.shape[1] != 2 or len(cells) == 0 or cells.dtype.kind not in "iuf":
-        raise ValueError(f"must return cells [L, 2] or None, not {cells.dtype} {list(cells.shape)}")
-    with np.errstate(invalid="ignore"):  # NaN, which is not an integer
-        whole = cells.astype(np.int64)
-    if not np.array_equal(whole, cells):
-        raise ValueError("must return whole rows and columns")
-    if tuple(whole[0]) != tuple(start) or tuple(whole[-1]) != tuple(goal):
-        ends = f"{whole[0].tolist()} to {whole[-1].tolist()}"
-        raise ValueError(f"its path goes from {ends}, not from {list(map(int, start))} to {list(map(int, goal))}")
-    if (whole < 0).any() or (whole >= classes.shape).any():
-        raise ValueError("its path leaves the map")
-    steps = np.diff(whole, axis=0)
-    if (np.abs(steps).max(1, initial=0) != 1).any():
-        raise ValueError("its path has cells that do not neighbour the cell before them")
-    solid, cost, moves = classes == Cell.OBSTACLE, 0.0, np.zeros(len(steps), np.int8)
-    for n, ((i, j), (di, dj)) in enumerate(zip(whole[:-1].tolist(), steps.tolist(), strict=True)):
-        p, q = i + di, j + dj
-        ends = classes[i, j], classes[p, q]
-        unmeasured, rise = Cell.UNMEASURED in ends, abs(int(levels[i, j]) - int(levels[p, q]))
-        if solid[i, j] or solid[p, q]:
-            raise ValueError(f"its path leads through the obstacle at {[p, q] if solid[p, q] else [i, j]}")
-        if not unmeasured and rise > 1:
-            raise ValueError(f"its path goes up or down {rise} levels between {[i, j]} and {[p, q]}")
-        sides = int(solid[i, q]) + int(solid[p, j]) if di and dj else 0
-        if sides == 2 or (sides == 1 and not cutting):
-            raise ValueError(f"its path cuts the corner of an obstacle between {[i, j]} and {[p, q]}")
-        motion = costs.c4 if unmeasured else costs.c3 if rise else costs.c2 if Cell.GATE in ends else costs.c1
-        cost += costs.c0 * (DIAGONAL if di and dj else 1.0) + motion
-        moves[n] = DIRECTION_OF[di, dj]
-    return moves, cost
+def passable(classes: np.ndarray, rules: np.ndarray) -> np.ndarray:
+    """Copies of maps [B, H, W] on which cells that must not be crossed, by `rules` [B, 3], are obstacles."""
+    grids = classes.copy()
+    for kind, allowed in ((Cell.BUMP, rules[:, 1]), (Cell.GATE, rules[:, 2])):
+        if not allowed.all():
+            grids[(grids == kind) & ~allowed[:, None, None]] = Cell.OBSTACLE
+    return grids
 
 
 TOLD: set = set()

@@ -31,6 +31,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from jaxbiped import planning
 from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning.host_planner import HostPlanner
+from jaxbiped.planning.planners import Problem
 
 COSTS, RULES = planning.Costs(), planning.Rules()
 WEIGHTS = np.array([100.0, 2.0, 6.0, 6.0, np.inf], np.float32)  # of a cell of each class, for pyastar2d
@@ -190,6 +192,32 @@ def singles(size, repeats):
         print(f", ratio {best[1] / best[0]:5.2f}, relative error {error:.0e}, first call {first:.1f} s")
 
 
+def host_planners(repeats: int = 50, count: int = 64) -> None:
+    """What a planner on the host costs beside its own time, in the compiled program: one that knows its path."""
+    path = np.array([(14, 4), *((14 - k, 4 + k) for k in range(1, 5)), *((10, j) for j in range(9, 31))])
+    ends = (np.tile(path[k], (count, 1)).astype(np.int32) for k in (0, -1))
+    zeros = np.zeros(count, np.float32)
+    costs, rules = (jax.tree.map(lambda v: np.full(count, v), given) for given in (COSTS, RULES))
+    problem = jax.device_put(Problem(
+        classes=np.full((count, 28, 36), Cell.FLOOR, np.int8), levels=np.zeros((count, 28, 36), np.int8),
+        start_ij=next(ends), goal_ij=next(ends), heading=zeros.astype(np.int32), yaw=zeros, costs=costs, rules=rules,
+        times=None, unit_seconds=zeros, surcharge=None, active=np.ones(count, bool),
+    ))  # fmt: skip
+    for kind, known in (("an array", path), ("a list of pairs", path.tolist())):
+        plan = jax.jit(HostPlanner(lambda *_, known=known: known).plan_batch)
+        assert not np.asarray(plan(problem).fault).any()
+        walls, own = [], []
+        for _ in range(repeats):
+            begun = time.perf_counter()
+            route = jax.block_until_ready(plan(problem))
+            walls.append(time.perf_counter() - begun)
+            own.append(float(route.seconds.sum()))
+        print(
+            f"host planner, {len(path)} cells as {kind}: {1e6 * min(walls) / count:.0f} us a call"
+            f" ({1e6 * min(own) / count:.0f} of them the call and its time limit)"
+        )
+
+
 def main():
     parser = argparse.ArgumentParser(description="Planning against compiled peers.")
     parser.add_argument("--quick", action="store_true", help="fewer maps and repeats: about half a minute")
@@ -201,10 +229,12 @@ def main():
             batches(pool, cores, 28, 36, 1024, 256, 3)
             batches(pool, cores, 140, 180, 64, 16, 2)
             singles(256, 3)
+            host_planners()
         else:
             batches(pool, cores, 28, 36, 4096, 2048, 8)
             batches(pool, cores, 140, 180, 512, 128, 5)
             singles(512, 8)
+            host_planners()
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ import pytest
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import DIRECTIONS, Costs, Rules
-from jaxbiped.planning.host_planner import HostPlanner, dared, read_way
+from jaxbiped.planning.host_planner import HostPlanner, passable
+from jaxbiped.planning.path_check import read_way, read_ways
 from tests.reference import planning as reference
 
 ROOT = Path(__file__).parents[2]
@@ -65,7 +66,7 @@ def test_random_walks_cost_what_the_plain_edges_cost_and_are_refused_where_these
         rules = Rules(*(bool(v) for v in rng.integers(0, 2, 3)))
         costs = Costs(*rng.uniform(0.1, 20, 5).tolist())
         edges = reference.edge_costs(classes, levels, costs, rules)
-        grid = dared(classes, rules.bumps, rules.gates)
+        grid = passable(classes[None], np.array([[rules.corner_cutting, rules.bumps, rules.gates]]))[0]
         for _ in range(20):
             moves = rng.integers(0, 8, rng.integers(1, 5))
             cells = np.vstack([[rng.integers(0, n) for n in shape], DIRECTIONS[moves]]).cumsum(0)
@@ -85,16 +86,58 @@ def test_random_walks_cost_what_the_plain_edges_cost_and_are_refused_where_these
     assert refused > 2000 and read > 200
 
 
+NASTY = (
+    None, [], [[]], [0, 0], "nonsense", [[0.5, 0.0]], [[np.nan, 0.0]], [[1e300, 0.0]], [[2**62, 0], [0, 0]], [[-1, -1]],
+    [[0, 0]], [[0, 0], [0, 0]], [[0, 0], [0, 2]], [(0, 0), (9, 9)], np.zeros((3, 2), np.uint8), np.zeros((0, 2)),
+    [[1, 2, 3]],
+)  # fmt: skip
+
+
+def test_a_batch_of_ways_is_read_as_one_by_one():
+    """Of walks and of nonsense, on maps of all classes and levels: the same moves, costs and complaints."""
+    rng, seen = np.random.default_rng(1), set()
+    for _ in range(60):
+        count, shape = rng.integers(1, 40), tuple(rng.integers(1, 6, 2))
+        classes = rng.choice(5, (count, *shape), p=(0.1, 0.5, 0.15, 0.15, 0.1)).astype(np.int8)
+        levels = rng.choice(3, (count, *shape), p=(0.8, 0.15, 0.05)).astype(np.int8)
+        costs, cutting = rng.uniform(0.1, 20, (count, 5)).astype(np.float32), rng.random(count) < 0.5
+        start, goal, ways = np.zeros((count, 2), np.int32), np.zeros((count, 2), np.int32), []
+        for k in range(count):
+            cells = np.vstack([[rng.integers(0, n) for n in shape], DIRECTIONS[rng.integers(0, 8, rng.integers(0, 5))]])
+            cells = cells.cumsum(0)
+            start[k], goal[k] = cells[0], cells[-1]
+            if rng.random() < 0.1:
+                goal[k] += 1
+            ways.append(NASTY[rng.integers(len(NASTY))] if rng.random() < 0.3 else cells.tolist())
+        moves, cost, wrong = read_ways(ways, classes, levels, start, goal, costs, cutting, 3)
+        for k, way in enumerate(ways):
+            expected, price, complaint = [-1, -1, -1], np.nan, None
+            try:
+                if way is not None:
+                    own = Costs(*costs[k].tolist())
+                    ends = start[k], goal[k]
+                    found, price = read_way(way, classes[k], levels[k], *ends, own, bool(cutting[k]))
+                    expected[: min(3, len(found))] = found[:3]
+            except Exception as error:
+                complaint = str(error)
+            assert moves[k].tolist() == expected and wrong.get(k) == complaint, (way, complaint)
+            np.testing.assert_array_equal(cost[k], np.float32(price))
+            seen.add(complaint and complaint[:20])
+    assert len(seen) > 8
+
+
 def test_no_way_to_go_is_a_way():
     moves, cost = read_way([[1, 0]], WALL, FLAT, (1, 0), (1, 0), COSTS, False)
     assert len(moves) == 0 and cost == 0
 
 
-def test_what_is_not_dared_is_an_obstacle():
+def test_cells_that_must_not_be_crossed_are_obstacles():
     grid = np.array([[Cell.FLOOR, Cell.BUMP, Cell.GATE, Cell.UNMEASURED]], np.int8)
-    assert (dared(grid, True, True) == grid).all()
-    assert dared(grid, False, True).tolist() == [[Cell.FLOOR, Cell.OBSTACLE, Cell.GATE, Cell.UNMEASURED]]
-    assert dared(grid, True, False).tolist() == [[Cell.FLOOR, Cell.BUMP, Cell.OBSTACLE, Cell.UNMEASURED]]
+    rules = np.array([[False, True, True], [False, False, True], [True, True, False]])
+    all_of_it, no_bumps, no_gates = passable(np.stack([grid] * 3), rules)
+    assert (all_of_it == grid).all()
+    assert no_bumps.tolist() == [[Cell.FLOOR, Cell.OBSTACLE, Cell.GATE, Cell.UNMEASURED]]
+    assert no_gates.tolist() == [[Cell.FLOOR, Cell.BUMP, Cell.OBSTACLE, Cell.UNMEASURED]]
     assert grid.tolist() == [[Cell.FLOOR, Cell.BUMP, Cell.GATE, Cell.UNMEASURED]]
 
 

@@ -1,0 +1,138 @@
+"""Paths that outside planners return: whether they may be walked, their moves, and their cost by Eq. 1."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from jaxbiped.mapping.grid import Cell
+from jaxbiped.planning.costs import DIRECTIONS, Costs
+
+DIRECTION_OF = {tuple(int(d) for d in move): k for k, move in enumerate(DIRECTIONS)}
+DIAGONAL = np.sqrt(2.0)
+CODES = np.full((3, 3), -1, np.int8)  # of a move by (di, dj), at [di + 1, dj + 1]
+for (_di, _dj), _code in DIRECTION_OF.items():
+    CODES[_di + 1, _dj + 1] = _code
+
+
+def read_ways(
+    ways: list[Any],
+    classes: np.ndarray,
+    levels: np.ndarray,
+    start: np.ndarray,
+    goal: np.ndarray,
+    costs: np.ndarray,
+    cutting: np.ndarray,
+    length: int,
+) -> tuple[np.ndarray, np.ndarray, dict[int, str]]:
+    """`read_way` of a batch at once, since one by one it takes longer than many a planner.
+
+    Args:
+      ways: the returned path of each map; None: there is none.
+      classes, levels: [B, H, W]. start, goal: [B, 2]. costs: [B, 5]. cutting: [B], whether corners may be cut.
+      length: most moves that are kept.
+
+    Returns:
+      moves int8 [B, length], -1 after the end; costs float32 [B], NaN without a path; what is wrong with which path.
+    """
+    moves = np.full((len(ways), length), -1, np.int8)
+    cost, wrong = np.full(len(ways), np.nan, np.float32), {}
+    paths, maps = [], []
+    for k, way in enumerate(ways):
+        if way is None:
+            continue
+        try:
+            paths.append(whole_cells(way))
+            maps.append(k)
+        except Exception as error:  # also from converting to an array
+            wrong[k] = str(error)
+    if not paths:
+        return moves, cost, wrong
+    cells, sizes, owner = np.concatenate(paths), np.array([len(path) for path in paths]), np.array(maps)
+    first = np.cumsum(sizes) - sizes
+    of_cell = np.repeat(np.arange(len(paths)), sizes)
+    bad = (cells[first] != start[owner]).any(1) | (cells[first + sizes - 1] != goal[owner]).any(1)
+    outside = ((cells < 0) | (cells >= classes.shape[1:])).any(1)
+    bad[of_cell[outside]] = True
+    step = np.flatnonzero(of_cell[1:] == of_cell[:-1])
+    path, (di, dj) = of_cell[step], (cells[step + 1] - cells[step]).T
+    far = np.maximum(abs(di), abs(dj)) != 1
+    bad[path[far]] = True
+    fine = ~bad[path]
+    step, path, di, dj = step[fine], path[fine], di[fine], dj[fine]
+    (i, j), k = cells[step].T, owner[path]
+    here, there = classes[k, i, j], classes[k, i + di, j + dj]
+    unmeasured = (here == Cell.UNMEASURED) | (there == Cell.UNMEASURED)
+    rise = abs(levels[k, i, j].astype(np.int64) - levels[k, i + di, j + dj])
+    diagonal = (di != 0) & (dj != 0)
+    sides = (classes[k, i, j + dj] == Cell.OBSTACLE).astype(np.int8) + (classes[k, i + di, j] == Cell.OBSTACLE)
+    barred = (here == Cell.OBSTACLE) | (there == Cell.OBSTACLE) | (~unmeasured & (rise > 1))
+    barred |= diagonal & ((sides == 2) | ((sides == 1) & ~cutting[k]))
+    bad[path[barred]] = True
+    gate = (here == Cell.GATE) | (there == Cell.GATE)
+    c0, c1, c2, c3, c4 = costs[k].astype(np.float64).T
+    motion = np.select([unmeasured, rise > 0, gate], [c4, c3, c2], c1)
+    total = np.bincount(path, c0 * np.where(diagonal, DIAGONAL, 1.0) + motion, len(paths))
+    place = step - first[path]
+    kept = ~bad[path] & (place < length)
+    moves[k[kept], place[kept]] = CODES[di[kept] + 1, dj[kept] + 1]
+    cost[owner[~bad]] = total[~bad]
+    for n in np.flatnonzero(bad).tolist():
+        k = maps[n]
+        try:
+            read_way(ways[k], classes[k], levels[k], start[k], goal[k], Costs(*costs[k].tolist()), bool(cutting[k]))
+        except ValueError as error:
+            wrong[k] = str(error)
+    return moves, cost, wrong
+
+
+def whole_cells(way) -> np.ndarray:
+    """The cells [L, 2] of a path as integers.
+
+    Raises:
+      ValueError: it is no list of rows and columns.
+    """
+    cells = np.asarray(way)
+    if cells.ndim != 2 or cells.shape[1] != 2 or len(cells) == 0 or cells.dtype.kind not in "iuf":
+        raise ValueError(f"must return cells [L, 2] or None, not {cells.dtype} {list(cells.shape)}")
+    if cells.dtype == np.int64:
+        return cells
+    with np.errstate(invalid="ignore"):  # NaN, which is not an integer
+        whole = cells.astype(np.int64)
+    if not np.array_equal(whole, cells):
+        raise ValueError("must return whole rows and columns")
+    return whole
+
+
+def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> tuple[np.ndarray, float]:
+    """The moves of one path, and its cost by Eq. 1.
+
+    Raises:
+      ValueError: what is wrong with the path.
+    """
+    whole = whole_cells(way)
+    if tuple(whole[0]) != tuple(start) or tuple(whole[-1]) != tuple(goal):
+        ends = f"{whole[0].tolist()} to {whole[-1].tolist()}"
+        raise ValueError(f"its path goes from {ends}, not from {list(map(int, start))} to {list(map(int, goal))}")
+    if (whole < 0).any() or (whole >= classes.shape).any():
+        raise ValueError("its path leaves the map")
+    steps = np.diff(whole, axis=0)
+    if (np.abs(steps).max(1, initial=0) != 1).any():
+        raise ValueError("its path has cells that do not neighbour the cell before them")
+    solid, cost, moves = classes == Cell.OBSTACLE, 0.0, np.zeros(len(steps), np.int8)
+    for n, ((i, j), (di, dj)) in enumerate(zip(whole[:-1].tolist(), steps.tolist(), strict=True)):
+        p, q = i + di, j + dj
+        ends = classes[i, j], classes[p, q]
+        unmeasured, rise = Cell.UNMEASURED in ends, abs(int(levels[i, j]) - int(levels[p, q]))
+        if solid[i, j] or solid[p, q]:
+            raise ValueError(f"its path leads through the obstacle at {[p, q] if solid[p, q] else [i, j]}")
+        if not unmeasured and rise > 1:
+            raise ValueError(f"its path goes up or down {rise} levels between {[i, j]} and {[p, q]}")
+        sides = int(solid[i, q]) + int(solid[p, j]) if di and dj else 0
+        if sides == 2 or (sides == 1 and not cutting):
+            raise ValueError(f"its path cuts the corner of an obstacle between {[i, j]} and {[p, q]}")
+        motion = costs.c4 if unmeasured else costs.c3 if rise else costs.c2 if Cell.GATE in ends else costs.c1
+        cost += costs.c0 * (DIAGONAL if di and dj else 1.0) + motion
+        moves[n] = DIRECTION_OF[di, dj]
+    return moves, cost
