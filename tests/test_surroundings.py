@@ -222,7 +222,7 @@ def test_a_script_that_turned_numba_off_is_told_so_in_one_line():
     )
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout == "NUMBA_DISABLE_JIT: must be 0 or unset: planners are compiled by Numba (got 1)\n"
+    assert done.stdout == "NUMBA_DISABLE_JIT: must be 0 or unset: planners and maps are compiled by Numba (got 1)\n"
 
 
 def test_warnings_of_a_command_are_one_line(capsys):

@@ -1,8 +1,8 @@
 """Machine code of kernels on disk: what Numba compiled once, the next process loads, in milliseconds.
 
-Numba's own cache cannot keep these kernels: they are closures over instructions made at run time, which it cannot tell
-apart. But all that they are made of is known: the sources of `planning` and `mapping`, the versions of Python, Numba
-and LLVM, and the kind of processor. A hash of these is the key: a changed program is never loaded.
+Numba's own cache cannot keep most of these kernels: they are closures over instructions made at run time, which it
+cannot tell apart. But all that they are made of is known: the sources of `planning` and `mapping`, the versions of
+Python, Numba and LLVM, and the kind of processor. A hash of these is the key: a changed program is never loaded.
 
 A file that is damaged, cut short or not readable is compiled anew; a folder that cannot be written to is done without.
 """
@@ -88,6 +88,7 @@ def key() -> str:
         llvmlite.__version__,
         platform.machine(),
         *cpu_target.target_context.codegen().magic_tuple(),
+        *(getattr(numba.config, name, None) for name in ("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE")),
     )
     made.update(repr(facts).encode())
     return made.hexdigest()[:16]

@@ -3,7 +3,7 @@
 This is the part of JAX's own cache that reads and writes files: bounded in size without another library, silent if the
 disk is full, read-only or damaged, and repaired by the next writer. JAX's key is a hash of the lowered program, of the
 versions of JAX and XLA and of their options; the folder's name identifies the processor, whose instructions an
-executable may use. An executable calls kernels (`planning.kernels`) by name, and finds those of its own process: it
+executable may use. An executable calls kernels (`core.xla_ffi`) by name, and finds those of its own process: it
 contains none of their code.
 
 A cache chosen by the user (`JAX_COMPILATION_CACHE_DIR`) is left to JAX.

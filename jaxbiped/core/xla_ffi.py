@@ -8,6 +8,7 @@ layout is a stable binary interface, kept for at least twelve months (`xla/ffi/a
 from __future__ import annotations
 
 import ctypes
+import threading
 
 import jax
 import numpy as np
@@ -18,7 +19,7 @@ from jaxbiped.core import machine_code
 from jaxbiped.errors import InputError
 
 if config.DISABLE_JIT:  # the command line overrides it; a script's own setting is not ours to change
-    raise InputError("must be 0 or unset: planners are compiled by Numba", field="NUMBA_DISABLE_JIT", value=1)
+    raise InputError("must be 0 or unset: planners and maps are compiled by Numba", field="NUMBA_DISABLE_JIT", value=1)
 
 # Places of the fields, in words of 8 bytes from the beginning of their structure.
 FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULTS = 1, 7, 9, 14
@@ -97,7 +98,10 @@ def register(name: str, function, *, keep: bool = False) -> None:
     """
     new = ctypes.pythonapi.PyCapsule_New
     new.restype, new.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p)
-    jax.ffi.register_ffi_target(name, new(compile_handler(name, function, keep), None, None), platform="cpu")
+    with LOCK:  # threads that trace, and those that load programs from the disk
+        if name not in ADDRESSES:
+            capsule = new(compile_handler(name, function, keep), None, None)
+            jax.ffi.register_ffi_target(name, capsule, platform="cpu")
 
 
 def compile_handler(name: str, function, keep: bool) -> int:
@@ -120,6 +124,7 @@ def compile_handler(name: str, function, keep: bool) -> int:
     return address
 
 
+LOCK = threading.RLock()
 HANDLERS: dict = {}
 ADDRESSES: dict = {}
 CALL = ctypes.CFUNCTYPE(ctypes.c_uint64, ctypes.c_void_p)

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.core import checks
-from jaxbiped.core.batching import by_batch_size
+from jaxbiped.core.batching import by_batch_size, by_platform
 from jaxbiped.core.signatures import checked
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, patch_sum
 from jaxbiped.mapping.params import MapParams
@@ -61,7 +61,7 @@ def class_cells(
 ) -> tuple[Int[Array, "H W"], Int[Array, "H W"]]:
     """`c_obstacles` of arguments that are known to be good: as `gridmap.add_view`, by a kernel or by XLA."""
     by_kernel, by_xla = (partial(way, spec=spec) for way in (class_by_kernel, class_by_xla))
-    read = by_batch_size(by_xla, partial(jax.lax.platform_dependent, cpu=by_kernel, default=by_xla), MANY)
+    read = by_batch_size(by_xla, by_platform(by_kernel, by_xla), MANY)
     return read(evidence, surfaces, body, params)
 
 
@@ -83,7 +83,7 @@ def class_by_xla(evidence, surfaces, body, params, spec):
 
 def class_by_kernel(evidence, surfaces, body, params, spec):
     """`class_cells` by machine code: a view without points is added to the map."""
-    from jaxbiped.mapping.kernels import map_update  # with Numba, which only a CPU needs
+    from jaxbiped.mapping.kernels import map_update  # with Numba, which takes a second to import
 
     votes, level_votes = (jnp.zeros((*spec.shape, kinds)) for kinds in (4, spec.ground_levels))
     points = tuple(jnp.zeros(0, kind) for kind in map_update.POINT_KINDS)
@@ -99,8 +99,8 @@ def kernel_settings(
     numbers = (
         params.voxel_points * spec.cell_share, params.voxel_share, params.solid_points,
         jnp.inf if params.below_points is None else params.below_points,
-        SURE * params.height_sd, body.step, body.step_tolerance, body.height_tolerance, body.height_tolerance / 2,
-        params.view_points * spec.cell_share,
+        jnp.square(SURE * params.height_sd), body.step, body.step_tolerance, body.height_tolerance,
+        body.height_tolerance / 2, params.view_points * spec.cell_share,
     )  # fmt: skip
     bands = jnp.stack(obstructing_levels(body, params.head_margin, spec))
     reaches = jnp.sum(disc(body.radius, spec), 1, dtype=jnp.int32) - 1
@@ -121,7 +121,7 @@ def occupied_levels(evidence: Float[Array, "H W Z"], params: MapParams, spec: Gr
     """
     above = jnp.pad(evidence[..., 1:], ((0, 0), (0, 0), (0, 1)))
     below = jnp.pad(evidence[..., :-1], ((0, 0), (0, 0), (1, 0)))
-    least = jnp.maximum(params.voxel_points * spec.cell_share, params.voxel_share * jnp.maximum(above, below))
+    least = jnp.maximum(params.voxel_points * spec.cell_share, params.voxel_share * greater(below, above))
     return pack((evidence > 0) & (evidence >= least), spec)
 
 

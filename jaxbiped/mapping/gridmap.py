@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.core import checks
-from jaxbiped.core.batching import by_batch_size
+from jaxbiped.core.batching import by_batch_size, by_platform
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_world
 from jaxbiped.mapping.cobstacles import MANY, careful, class_by_xla, kernel_settings
@@ -103,7 +104,8 @@ def add_view(
 ) -> GridMap:
     """The map of one arena after what one more view tells.
 
-    Maps of a batch are read by a compiled kernel on a CPU; single ones, and all on other devices, by XLA.
+    Batches of `MANY` maps are read by a compiled kernel on a CPU; smaller ones, and all on other devices, by XLA. The
+    results are the same, bit for bit, where the numbers are finite and none is negative.
 
     Args:
       view: brought level, in the robot frame; `z` [m] the height of what the robot stands on.
@@ -111,7 +113,7 @@ def add_view(
       body: the careful one (`cobstacles.careful`).
     """
     by_kernel, by_xla = (partial(way, spec=spec) for way in (add_view_by_kernel, add_view_by_xla))
-    add = by_batch_size(by_xla, partial(jax.lax.platform_dependent, cpu=by_kernel, default=by_xla), MANY)
+    add = by_batch_size(by_xla, by_platform(by_kernel, by_xla), MANY)
     return add(grid_map, view, z, index, counts, body, params)
 
 
@@ -124,7 +126,7 @@ def add_view_jvp(spec, primals, tangents):
 def add_view_by_xla(grid_map, view, z, index, counts, body, params, spec):
     """`add_view` in JAX."""
     points = without_few(voxelise(view, index, counts, spec), params, spec)
-    count = points.sum(-1)
+    count = functools.reduce(jnp.add, jnp.unstack(points, axis=-1))  # in this order, which a sum leaves to XLA
     count = jnp.where(count >= params.view_points * spec.cell_share, count, 0.0)
     surfaces = add_surfaces(grid_map.surfaces, view, z, index, counts, params, spec)
     evidence = grid_map.evidence + points
@@ -134,7 +136,7 @@ def add_view_by_xla(grid_map, view, z, index, counts, body, params, spec):
 
 def add_view_by_kernel(grid_map, view, z, index, counts, body, params, spec):
     """`add_view` by machine code."""
-    from jaxbiped.mapping.kernels import map_update  # with Numba, which only a CPU needs
+    from jaxbiped.mapping.kernels import map_update  # with Numba, which takes a second to import
 
     maps = grid_map.evidence, grid_map.votes, grid_map.level_votes, grid_map.surfaces
     points = jnp.where(counts, index, -1), view.weight, surface_share(view, params), view.z + z

@@ -111,9 +111,10 @@ def read_relief(
     many, rise = jnp.maximum(patch_sum(surfaces.weight, spec), 1e-6), patch_sum(surfaces.rise, spec)
     levels = range(spec.ground_levels)
     mean = [level * jnp.float32(spec.level_height) + rise[level] / many[level] for level in levels]
-    error = [SURE * params.height_sd / jnp.sqrt(many[level]) for level in levels]
+    # The root of a quotient, since XLA makes a product of a quotient by a root, and one operation of that and of a sum.
+    error = [jnp.sqrt(jnp.square(SURE * params.height_sd) / many[level]) for level in levels]
     most = greatest_within(surfaces.weight, spec.beside)
-    height = ground * jnp.float32(spec.level_height)
+    height = jnp.take(spec.ground_heights(), ground, mode="clip")
     sd, top = jnp.zeros(ground.shape), jnp.full(ground.shape, -jnp.inf)
     for level in levels:
         known = (solid >> level) & 1 != 0
@@ -134,7 +135,7 @@ def is_untenable(relief: Relief, ground: Int[Array, "H W"], body: Body, spec: Gr
     cells, where it lies off to one side and a neighbour's to the other. Of two neighbours that do not go together the
     one that is further off is untenable. What may be an error of measurement is none.
     """
-    off = relief.height - ground * spec.level_height
+    off = relief.height - jnp.take(spec.ground_heights(), ground, mode="clip")
     high, low = off - relief.error, off + relief.error  # surely at least, surely at most
     highest, lowest = neighbours(high, greater, -jnp.inf), -neighbours(-low, greater, -jnp.inf)
     most, half = body.height_tolerance, body.height_tolerance / 2

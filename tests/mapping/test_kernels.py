@@ -17,7 +17,7 @@ from jaxbiped import mapping
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import cobstacles, gridmap
 from jaxbiped.mapping.config import MapConfig
-from jaxbiped.mapping.grid import Body, GridSpec
+from jaxbiped.mapping.grid import Body, Cell, GridSpec
 from jaxbiped.mapping.gridmap import GridMap
 from jaxbiped.mapping.relief import Surfaces
 from jaxbiped.sensing.view import View
@@ -31,8 +31,11 @@ SPECS = {
     "coarse": GridSpec(size_x=1.2, size_y=0.8, pitch=0.1, levels=9, lowest=-3, ground_levels=1, max_radius=0.0),
     "all bits": GridSpec(size_x=0.4, size_y=0.3, levels=32, lowest=0, ground_levels=24),
     "no room": GridSpec(size_x=0.4, size_y=0.3, levels=2, lowest=0, ground_levels=1),
+    "deep": GridSpec(size_x=0.2, size_y=0.2, levels=40, lowest=-8),
+    "fine and deep": GridSpec(size_x=0.15, size_y=0.1, pitch=0.0125, levels=20, lowest=-8, max_radius=0.3),
 }
 BATCH, POINTS = 24, 64
+LARGE = 64  # maps at once: XLA sums otherwise in large arrays than in small ones, unless it is told how
 
 
 def nasty_counts(rng, shape):
@@ -59,6 +62,8 @@ def nasty_view(rng, spec):
     y = rng.choice([0.0, spec.pitch, spec.size_y, rng.uniform(0, spec.size_y), -5.0], POINTS)
     z = rng.choice([0.0, 0.015, 0.03, 0.0449, 0.3, 0.5 * spec.level_height, -0.2, np.nan], POINTS)
     weight = rng.choice([0.0, 1.0, 4.0, 64.0, -1.0, np.inf], POINTS, p=[0.1, 0.3, 0.3, 0.2, 0.05, 0.05])
+    if rng.random() < 0.5:
+        weight *= rng.uniform(0.5, 2, POINTS)  # so that the order of a sum is seen in its last bit
     if rng.random() < 0.3:
         x[:], y[:], z[:] = x[0], y[0], z[0]
     return View(*(v.astype(np.float32) for v in (x, y, z, weight)))
@@ -75,16 +80,17 @@ def nasty_body(rng, spec):
     return Body(*(np.float32(v) for v in numbers))
 
 
-def nasty_params(rng):
+def nasty_params(rng, below):
     choices = {
         "voxel_points": (0.0, 2.0),
         "solid_points": (0.0, 20.0, 144.0),
         "view_points": (0.0, 5.0),
         "voxel_share": (0.0, 0.05, 0.9),
         "head_margin": (0.0, 0.02),
-        "below_points": (2.0, 144.0),
+        "height_margin": (0.0, 0.0015),
     }
-    config = MapConfig(**{name: float(rng.choice(values)) for name, values in choices.items()})
+    numbers = {name: float(rng.choice(values)) for name, values in choices.items()}
+    config = MapConfig(**numbers, below_points=float(rng.choice([2.0, 144.0])) if below else None)
     return jax.tree.map(np.asarray, config.params())
 
 
@@ -98,7 +104,7 @@ def draw(seed, spec):
         [nasty_view(rng, spec) for _ in range(BATCH)],
         poses,
         [nasty_body(rng, spec) for _ in range(BATCH)],
-        [nasty_params(rng) for _ in range(BATCH)],
+        [nasty_params(rng, below=seed % 2 == 0) for _ in range(BATCH)],
     )
     return tuple(jax.tree.map(lambda *leaves: np.stack(leaves), *part) for part in parts)
 
@@ -138,6 +144,46 @@ def test_cells_have_the_same_class(name):
     assert len(seen) > 1  # so that not all is one wall
 
 
+def test_sums_have_one_order_in_large_batches():
+    """Of the map that studies use, with weights that are not whole."""
+    spec, rng = SPECS["usual"], np.random.default_rng(5)
+    view = View(*(rng.uniform(low, high, (LARGE, 2000)).astype(np.float32) for low, high in AREA))
+    grid_map = jax.vmap(lambda _: gridmap.empty(spec))(jnp.arange(LARGE))
+    given = grid_map, view, Pose(*(np.zeros((4, LARGE), np.float32))), Body(0.12, 0.42, 0.36, 0.03, 0.01, 0.01)
+    ways = gridmap.add_view_by_kernel, gridmap.add_view_by_xla
+    ours, theirs = (
+        jax.jit(jax.vmap(partial(one_view, way, spec), in_axes=(0, 0, 0, None, None)))(*given, MapConfig().params())
+        for way in ways
+    )
+    assert float(ours.votes.max()) > 300
+    for mine, other in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
+        np.testing.assert_array_equal(mine, other)
+
+
+AREA = (0, 1.8), (0, 1.4), (-0.02, 0.4), (0.5, 64)
+
+
+def test_heights_that_just_do_are_told_alike():
+    """At ties: the error of a height is what it may be off, to the last bit."""
+    spec = GridSpec(size_x=0.1, size_y=0.05, levels=3, lowest=0, ground_levels=1, max_radius=0)
+    rng, params = np.random.default_rng(0), MapConfig(height_margin=0).params()
+    weight = rng.uniform(300, 4000, (2000, 1, 1, 1)).astype(np.float32) * np.ones((1, 1, 1, 2), np.float32)
+    surfaces = Surfaces(weight, (weight * np.float32(0.03)).astype(np.float32))
+    evidence = np.zeros((2000, 1, 2, 3), np.float32)
+    evidence[..., 0] = 1000
+    height = surfaces.rise[:, 0, 0, 0] / weight[:, 0, 0, 0]
+    error = np.sqrt(np.square(np.float32(2) * np.float32(0.011)) / weight[:, 0, 0, 0])
+    tolerance = height - error  # just what such ground is surely off
+    body = Body(np.float32(0), np.float32(0.42), np.float32(0.36), np.float32(2), np.float32(0.01), tolerance)
+    axes = 0, 0, Body(None, None, None, None, None, 0), None
+    ours, theirs = (
+        jax.jit(jax.vmap(partial(way, spec=spec), in_axes=axes))(evidence, surfaces, body, params)
+        for way in (cobstacles.class_by_kernel, cobstacles.class_by_xla)
+    )
+    np.testing.assert_array_equal(ours[0], theirs[0])
+    assert (ours[0] == Cell.FLOOR).all()  # what it may be, it is not more than
+
+
 def test_batches_of_batches_and_of_none():
     """The kernel reads its batch off its arguments' ranks."""
     spec = SPECS["fine"]
@@ -146,6 +192,8 @@ def test_batches_of_batches_and_of_none():
     folded = jax.tree.map(lambda leaf: leaf.reshape(4, BATCH // 4, *leaf.shape[1:]), given)
     deep = jax.jit(jax.vmap(jax.vmap(partial(one_view, gridmap.add_view_by_kernel, spec))))(*folded)
     alone = partial(one_view, gridmap.add_view, spec)(*jax.tree.map(lambda leaf: jnp.asarray(leaf[5]), given))
+    none = jax.tree.map(lambda leaf: leaf[:0], folded)
+    assert jax.jit(jax.vmap(jax.vmap(partial(one_view, gridmap.add_view_by_kernel, spec))))(*none).votes.size == 0
     for whole, part, one in zip(*map(jax.tree.leaves, (flat, deep, alone)), strict=True):
         np.testing.assert_array_equal(whole, part.reshape(whole.shape))
         np.testing.assert_array_equal(whole[5], one)

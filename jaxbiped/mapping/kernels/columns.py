@@ -67,7 +67,7 @@ def read_columns(evidence, shape, layout, numbers, bits, points, columns, ground
     (height, width, depth, margin, across), (lowest, _, _, grounds) = shape, layout
     beside, size = np.empty(len(evidence), np.float32), len(evidence)
     greater_of(evidence, 0, evidence, 2, size - 2, beside, 1)
-    for first in range(0, size if depth > 1 else 0, depth):  # the ends of columns are not each other's neighbours
+    for first in range(0, size, depth):  # the ends of columns are not each other's neighbours
         beside[first], beside[first + depth - 1] = evidence[first + 1], evidence[first + depth - 2]
     whole, peaks = points.view(np.int32), peaks.view(np.int32)
     for i in range(height):

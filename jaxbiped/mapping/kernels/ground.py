@@ -18,7 +18,7 @@ EDGE_32, SHARE_32, FEWEST = np.float32(EDGE), np.float32(SHARE), np.float32(1e-6
 
 
 @compiled
-def read_relief(weight, rise, shape, layout, error, heights, columns, ground, solid, height_of, error_of, top):
+def read_relief(weight, rise, shape, layout, variance, heights, columns, ground, solid, height_of, error_of, top):
     """`relief.read_relief`: height and error of each cell's ground, and how high it is at least."""
     (height, width, _, margin, across), (_, aside, beside, grounds) = shape, layout
     cells, size = height * width, len(top)
@@ -43,7 +43,7 @@ def read_relief(weight, rise, shape, layout, error, heights, columns, ground, so
         for n in range(U(cells)):
             pixels = many[n] if many[n] > FEWEST else FEWEST
             means[U(start) + n] = heights[level] + total[n] / pixels
-            errors[U(start) + n] = error / np.sqrt(pixels)
+            errors[U(start) + n] = np.sqrt(variance / pixels)
     own = numbers_of(size, -INF)
     for i in range(height):
         for j in range(width):

@@ -105,6 +105,8 @@ def solve(arguments, count, results):
     for axis in range(rank - 3):
         batch *= np.int64(dims[axis])
     height, width, depth = np.int64(dims[rank - 3]), np.int64(dims[rank - 2]), np.int64(dims[rank - 1])
+    if batch == 0:
+        return
     many = np.int64(xla_ffi.shape(arguments, U(5))[rank - 3])
     reach = np.int64(xla_ffi.shape(arguments, U(10))[rank - 3])
     given = integers(arguments, U(12), 0, LAYOUT)
@@ -157,7 +159,7 @@ def add_view(
       points: of this view: the voxel of each, -1 if it does not count, its pixels, how much they tell of the surface
         there, and its height above the base floor [m].
       numbers: least points of an occupied voxel; share of the points next to it; least points of a solid patch; the
-        same below one, inf for none; standard error [m] of a height times the root of its pixels; step [m]; its
+        same below one, inf for none; square of the standard error [m] of a height, times its pixels; step [m]; its
         tolerance; error [m] of the ground that a step bears; half of that; least points of a view's cell that votes.
       reaches: how far the disc of the body's radius goes along a row so many rows away; -1: nowhere.
       bands: levels, counted from the ground, that squatting and standing bodies meet.
