@@ -24,7 +24,7 @@ def said(capsys, *words) -> str:
 def test_an_empty_cache_is_shown_and_cleared(folder, capsys):
     for words in ((), ("--clear",), ()):
         text = said(capsys, *words)
-        assert f"{folder} (does not exist yet)" in text and "0 kernels" in text and "0 programs" in text
+        assert f"{folder} (does not exist yet)" in text and "0 Numba kernels" in text and "0 XLA programs" in text
     assert not folder.exists()
 
 
@@ -38,7 +38,7 @@ def test_what_is_kept_is_counted_and_cleared_and_no_other_file(folder, capsys):
     assert said(capsys) == text  # looking changes nothing
     assert said(capsys, "--clear").endswith("cleared\n")
     assert sorted(path.name for path in folder.rglob("*")) == ["kernels", "mine.txt", "programs"]
-    assert "0 kernels" in said(capsys)
+    assert "0 Numba kernels" in said(capsys)
 
 
 def test_no_cache_at_all(monkeypatch, capsys):
