@@ -24,7 +24,10 @@ FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULT_COUNT, FRAM
 BUFFER_DTYPE, BUFFER_DATA, BUFFER_RANK, BUFFER_SHAPE = 2, 3, 4, 5
 EXTENSION_TYPE, EXTENSION_METADATA, METADATA_VERSION, METADATA = 1, 3, 3, 1
 VERSION = 1 << 32  # major 0 in the lower half of the word, minor 1 in the upper
-DTYPES = {1: np.bool_, 2: np.int8, 4: np.int32, 8: np.uint32, 11: np.float32}  # XLA's types, those that are used
+# XLA's types, those that are used, as NumPy writes them.
+DTYPES = {
+    code: np.dtype(name).str for code, name in {1: "?", 2: "int8", 4: "int32", 8: "uint32", 11: "float32"}.items()
+}
 
 Function = Callable[..., Sequence[np.ndarray]]
 FUNCTIONS: dict[int, Function] = {}
@@ -66,9 +69,22 @@ def register() -> None:
     jax.ffi.register_ffi_target(NAME, new(address, None, None), platform="cpu")
 
 
+@cache  # ctypes forgets a type that nothing refers to, and creating one takes longer than reading it
+def words_type(count: int) -> type:
+    """The type of an array of words of 8 bytes."""
+    return ctypes.c_uint64 * count
+
+
 def words(address: int, count: int):
     """Words of 8 bytes at an address, as Python numbers."""
-    return (ctypes.c_uint64 * count).from_address(address)
+    return words_type(count).from_address(address)
+
+
+class Memory:
+    """Foreign memory that NumPy can wrap."""
+
+    def __init__(self, address: int, shape: tuple[int, ...], dtype: str) -> None:
+        self.__array_interface__ = {"data": (address, False), "shape": shape, "typestr": dtype, "version": 3}
 
 
 def array(buffer: int) -> np.ndarray:
@@ -76,11 +92,10 @@ def array(buffer: int) -> np.ndarray:
     fields = words(buffer, BUFFER_SHAPE + 1)
     rank = fields[BUFFER_RANK]
     shape = tuple(words(fields[BUFFER_SHAPE], rank)) if rank else ()
-    dtype = np.dtype(DTYPES[fields[BUFFER_DTYPE] & 0xFFFFFFFF])
-    size = int(np.prod(shape, dtype=np.int64)) * dtype.itemsize
-    if size == 0:
+    dtype = DTYPES[fields[BUFFER_DTYPE] & 0xFFFFFFFF]
+    if 0 in shape:  # its address may be null
         return np.zeros(shape, dtype)
-    return np.frombuffer((ctypes.c_uint8 * size).from_address(fields[BUFFER_DATA]), dtype).reshape(shape)
+    return np.asarray(Memory(fields[BUFFER_DATA], shape, dtype))
 
 
 @ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)

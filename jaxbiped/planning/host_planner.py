@@ -140,12 +140,13 @@ def answer(classes, levels, start, goal, costs, rules, active, numbers):
     seconds, fault = np.zeros(count, np.float32), np.full(count, FINE, np.int8)
     grids = passable(classes, rules)
     given, raised = grids.copy(), levels.copy()  # of which functions may do what they like
-    starts, goals, own = start.tolist(), goal.tolist(), [Costs(*row) for row in costs.tolist()]
+    starts, goals, rows = start.tolist(), goal.tolist(), [tuple(row) for row in costs.tolist()]
+    own = {row: Costs(*row) for row in set(rows)}
     ways: list[Any] = [None] * count
     for k in np.flatnonzero(active).tolist():
         function, limit = FUNCTIONS[numbers[k]]
         begun = time.perf_counter()
-        fault[k], ways[k] = call(function, limit, given[k], raised[k], tuple(starts[k]), tuple(goals[k]), own[k])
+        fault[k], ways[k] = call(function, limit, given[k], raised[k], tuple(starts[k]), tuple(goals[k]), own[rows[k]])
         seconds[k] = time.perf_counter() - begun
     moves, cost, wrong = read_ways(ways, grids, levels, start, goal, costs, rules[:, 0], length)
     for k, message in wrong.items():

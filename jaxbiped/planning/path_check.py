@@ -11,6 +11,9 @@ from jaxbiped.planning.costs import DIRECTIONS, Costs
 
 DIRECTION_OF = {tuple(int(d) for d in move): k for k, move in enumerate(DIRECTIONS)}
 DIAGONAL = np.sqrt(2.0)
+UNMEASURED, GATE, OBSTACLE = (
+    int(cell) for cell in (Cell.UNMEASURED, Cell.GATE, Cell.OBSTACLE)
+)  # NumPy is slow with enums
 CODES = np.full((3, 3), -1, np.int8)  # of a move by (di, dj), at [di + 1, dj + 1]
 for (_di, _dj), _code in DIRECTION_OF.items():
     CODES[_di + 1, _dj + 1] = _code
@@ -49,34 +52,43 @@ def read_ways(
             wrong[k] = str(error)
     if not paths:
         return moves, cost, wrong
-    cells, sizes, owner = np.concatenate(paths), np.array([len(path) for path in paths]), np.array(maps)
-    first = np.cumsum(sizes) - sizes
+    # Rows and columns apart, and cells by their place in all maps: arrays [N, 2] and indices of three axes take NumPy
+    # several times as long.
+    rows, columns = np.ascontiguousarray(np.concatenate(paths).T)
+    sizes, owner = np.array([len(path) for path in paths]), np.array(maps)
+    last = np.cumsum(sizes) - 1
+    first = last - sizes + 1
     of_cell = np.repeat(np.arange(len(paths)), sizes)
-    bad = (cells[first] != start[owner]).any(1) | (cells[first + sizes - 1] != goal[owner]).any(1)
-    outside = ((cells < 0) | (cells >= classes.shape[1:])).any(1)
+    (height, width), ends = classes.shape[1:], np.stack([start[owner], goal[owner]])
+    found = np.stack([np.stack([rows[at], columns[at]], -1) for at in (first, last)])
+    bad = (found != ends).any((0, 2))
+    outside = (rows < 0) | (rows >= height) | (columns < 0) | (columns >= width)
     bad[of_cell[outside]] = True
-    step = np.flatnonzero(of_cell[1:] == of_cell[:-1])
-    path, (di, dj) = of_cell[step], (cells[step + 1] - cells[step]).T
-    far = np.maximum(abs(di), abs(dj)) != 1
-    bad[path[far]] = True
-    fine = ~bad[path]
-    step, path, di, dj = step[fine], path[fine], di[fine], dj[fine]
-    (i, j), k = cells[step].T, owner[path]
-    here, there = classes[k, i, j], classes[k, i + di, j + dj]
-    unmeasured = (here == Cell.UNMEASURED) | (there == Cell.UNMEASURED)
-    rise = abs(levels[k, i, j].astype(np.int64) - levels[k, i + di, j + dj])
-    diagonal = (di != 0) & (dj != 0)
-    sides = (classes[k, i, j + dj] == Cell.OBSTACLE).astype(np.int8) + (classes[k, i + di, j] == Cell.OBSTACLE)
-    barred = (here == Cell.OBSTACLE) | (there == Cell.OBSTACLE) | (~unmeasured & (rise > 1))
-    barred |= diagonal & ((sides == 2) | ((sides == 1) & ~cutting[k]))
+    step = np.flatnonzero((of_cell[1:] == of_cell[:-1]) & ~bad[of_cell[1:]])
+    down, right = rows[step + 1] - rows[step], columns[step + 1] - columns[step]
+    near = np.maximum(np.abs(down), np.abs(right)) == 1
+    bad[of_cell[step[~near]]] = True
+    step, down, right = step[near], down[near], right[near]
+    path = of_cell[step]
+    k = owner[path]
+    kinds, heights = classes.ravel(), levels.ravel()
+    at, below = (k * height + rows[step]) * width + columns[step], down * width
+    here, there = kinds[at], kinds[at + below + right]
+    unmeasured = (here == UNMEASURED) | (there == UNMEASURED)
+    rise = np.abs(heights[at].astype(np.int16) - heights[at + below + right])
+    diagonal = (down != 0) & (right != 0)
+    sides = (kinds[at + right] == OBSTACLE).astype(np.int8) + (kinds[at + below] == OBSTACLE)
+    barred = (here == OBSTACLE) | (there == OBSTACLE) | (~unmeasured & (rise > 1))
+    barred |= diagonal & (sides > cutting[k])
     bad[path[barred]] = True
-    gate = (here == Cell.GATE) | (there == Cell.GATE)
-    c0, c1, c2, c3, c4 = costs[k].astype(np.float64).T
-    motion = np.select([unmeasured, rise > 0, gate], [c4, c3, c2], c1)
-    total = np.bincount(path, c0 * np.where(diagonal, DIAGONAL, 1.0) + motion, len(paths))
+    gate = (here == GATE) | (there == GATE)
+    event = np.where(unmeasured, 4, np.where(rise > 0, 3, np.where(gate, 2, 1)))
+    price = costs.astype(np.float64)
+    total = price[k, 0] * np.where(diagonal, DIAGONAL, 1.0) + price.ravel()[5 * k + event]
+    total = np.bincount(path, total, len(paths))
     place = step - first[path]
     kept = ~bad[path] & (place < length)
-    moves[k[kept], place[kept]] = CODES[di[kept] + 1, dj[kept] + 1]
+    moves.ravel()[k[kept] * length + place[kept]] = CODES.ravel()[3 * down[kept] + right[kept] + 4]
     cost[owner[~bad]] = total[~bad]
     for n in np.flatnonzero(bad).tolist():
         k = maps[n]
