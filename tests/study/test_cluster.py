@@ -317,6 +317,34 @@ def test_commands_on_workers_give_the_local_table(monkeypatch, tmp_path):
     assert spread.height == 32 and spread.filter(pl.col("arena").is_in(local["arena"].unique().to_list())).equals(local)
 
 
+OWN_PLANNER = """
+def right_then_down(classes, levels, start_ij, goal_ij, costs):
+    if (classes == 4).sum() % 7 == 3:
+        raise RuntimeError("refuses")  # on a worker, too, this ends one mission and not the study
+    (i, j), (p, q) = start_ij, goal_ij
+    across = [(i, k) for k in range(j, q, 1 if q > j else -1)]
+    return [*across, *((k, q) for k in range(i, p, 1 if p > i else -1)), (p, q)]
+"""
+
+
+@pytest.mark.slow  # as above
+def test_a_planner_on_the_host_gives_the_same_rows_on_workers(monkeypatch, tmp_path):
+    """Its functions are numbered in each process by itself, so that a batch must name them in another way."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path / "cache"))
+    (tmp_path / "planner_of_this_test.py").write_text(OWN_PLANNER)
+    own = "planner_of_this_test:right_then_down"
+    study = ["--arenas", "12", "--shard", "3", "--families", "bump", "gate", "--strategies", own, "full"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    for out, *more in (["local"], ["spread", "--workers", "2"]):
+        command = [sys.executable, "-m", "jaxbiped.cli", "compare", *study, "--out", out, *more]
+        assert subprocess.run(command, env=environment).returncode == 0
+    local, spread = (store.read(tmp_path / name)[0].drop("planning_time") for name in ("local", "spread"))
+    assert local.equals(spread) and local.height == 24
+    mine = local.filter(pl.col("strategy") == "right_then_down")
+    assert mine["planning_calls"].sum() > mine.height and mine["code"].n_unique() > 1
+
+
 def test_workers_of_this_machine_find_modules_of_the_working_directory(tmp_path, monkeypatch):
     """A generator of a module there, as `--families lab:hills` names it, goes to a worker and is found by it."""
     (tmp_path / "hills_of_this_test.py").write_text("def hills(key):\n    return key\n")
