@@ -338,7 +338,7 @@ def test_a_planner_on_the_host_gives_the_same_rows_on_workers(monkeypatch, tmp_p
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     for out, *more in (["local"], ["spread", "--workers", "2"]):
         command = [sys.executable, "-m", "jaxbiped.cli", "compare", *study, "--out", out, *more]
-        assert subprocess.run(command, env=environment).returncode == 0
+        subprocess.run(command, check=True, env=environment)
     local, spread = (store.read(tmp_path / name)[0].drop("planning_time") for name in ("local", "spread"))
     assert local.equals(spread) and local.height == 24
     mine = local.filter(pl.col("strategy") == "right_then_down")
