@@ -9,7 +9,7 @@ BIN := $(VENV)/bin
 # The quickest tests of every room: a minute on two cores.
 QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_figures.py test_house.py test_imports.py core \
   $(addprefix arenas/, test_scene.py) \
-  $(addprefix mapping/, test_class_grid.py test_grid.py test_leveling.py) \
+  $(addprefix mapping/, test_grid.py test_leveling.py) \
   $(addprefix formats/, test_cloud.py test_moving_ai.py test_ros_map.py) \
   $(addprefix planning/, test_path.py) \
   $(addprefix sensing/, test_configs.py test_motion.py test_noise.py) \

@@ -27,7 +27,7 @@ lazy_package(
         "arenas.scene": "BoxConfig:Box SceneConfig:Scene to_arena",
         "arenas.source": "Family",
         "errors": "InputError",
-        "mapping.class_grid": "ClassGrid",
+        "core.class_grid": "ClassGrid",
         "mapping.grid": "Cell",
         "mission.config": "CostConfig MissionConfig",
         "mission.metric": "Metric",

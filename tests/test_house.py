@@ -14,15 +14,13 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 PACKAGE = "jaxbiped"
 ROOMS = (
-    *("core", "geometry", "arenas", "sensing", "stereo", "mapping", "localisation", "formats", "planning", "motion"),
+    *("core", "geometry", "formats", "arenas", "sensing", "stereo", "mapping", "localisation", "planning", "motion"),
     *("physics", "biped", "executors", "mission", "statistics", "study", "report", "reproduction", "viewer"),
     *("api", "commands", "cli"),
 )
 FRONT = "api"  # the room of `import jaxbiped`, whose names are the public ones
 AT_THE_TOP = {"cli": "cli", "__main__": "cli", "testing": FRONT}  # modules beside the rooms; all others are the core's
-UPWARDS = {  # imports of a later room, by file: the lines that do it
-    "jaxbiped/arenas/scene.py": ("from jaxbiped.formats.elevation import load_elevation",),
-}
+UPWARDS: dict[str, tuple[str, ...]] = {}  # imports of a later room, by file: the lines that do it
 CIRCULAR = {  # imports that close a circle, by file: the lines that do it
     # A config is light to load; its traced form, which loads JAX, is made from it.
     "jaxbiped/mission/config.py": ("from jaxbiped.mission.settings import settings_of",),

@@ -10,10 +10,10 @@ from PIL import Image
 from pypcd4 import Encoding, PointCloud
 
 from jaxbiped.arenas.scene import load_scene
+from jaxbiped.core import class_grid
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.formats import cloud, moving_ai, ros_map
 from jaxbiped.formats.cloud import save_ply
-from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.stereo import images
 from jaxbiped.stereo.calibration_files import load_rig
 from tests.nasty_files import read_or_refuse, same, spoilt

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from jaxbiped import planning
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.planning.costs import Costs, Rules
 
 

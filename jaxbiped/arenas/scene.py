@@ -18,6 +18,7 @@ from jaxbiped.arenas.ground import HOLE, rises_near, terrain_height
 from jaxbiped.config import Model, load
 from jaxbiped.core.signatures import checked
 from jaxbiped.errors import InputError
+from jaxbiped.formats.elevation import load_elevation
 from jaxbiped.geometry.boxes import Boxes
 from jaxbiped.geometry.height_field import HeightField
 
@@ -126,8 +127,6 @@ def to_terrain(scene: SceneConfig, folder: Path) -> HeightField | None:
     Raises:
       InputError: the map cannot be used, or lies outside the area.
     """
-    from jaxbiped.formats.elevation import load_elevation  # from a later room, which reads files for this one
-
     given = scene.terrain
     if given is None:
         return None

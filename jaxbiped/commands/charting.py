@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from jaxbiped.commands.options.charting import ChartArgs
+from jaxbiped.core import class_grid
 from jaxbiped.files import write_whole
-from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.scan_map import Chart, lay_out, make_chart
 

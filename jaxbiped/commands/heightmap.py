@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Float64
 
 from jaxbiped.commands.charting import say_cells, write_json
+from jaxbiped.core import class_grid
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder
 from jaxbiped.formats.elevation import Elevation, load_elevation, save_elevation
-from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.grid import MOST_CELLS, MOST_GROUNDS, GridSpec
 from jaxbiped.mapping.truth import terrain_grid
 from jaxbiped.motion.config import RobotConfig

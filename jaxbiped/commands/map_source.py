@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from jaxbiped.core import class_grid
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason
 from jaxbiped.formats import moving_ai, ros_map
-from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.inflation import inflate
 from jaxbiped.report.axis import CENTIMETRES, METRES, Axis

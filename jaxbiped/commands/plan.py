@@ -16,9 +16,9 @@ from jaxbiped.commands.map_source import MapSource, open_map
 from jaxbiped.commands.options.plan import PlanArgs
 from jaxbiped.commands.scenario import check_scenario
 from jaxbiped.config import config_hash, load
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.motion.config import RobotConfig
 from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, next_step

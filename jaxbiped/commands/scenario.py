@@ -15,10 +15,10 @@ from rich.console import Console
 from rich.progress import track
 
 from jaxbiped.commands.map_source import MapSource
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, write_whole
 from jaxbiped.formats.moving_ai import load_scenario
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import Costs, Rules, field
 

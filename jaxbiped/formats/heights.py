@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64
 
+from jaxbiped.core.class_grid import MOST_CELLS
 from jaxbiped.errors import InputError
-from jaxbiped.mapping.grid import MOST_CELLS
 
 GREATEST = 1e4  # [m] largest height; larger values are marks for "no data" that the file does not declare
 

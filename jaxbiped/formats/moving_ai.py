@@ -19,10 +19,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float64, Int
 
+from jaxbiped.core.class_grid import Cell, ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.files import read_text
-from jaxbiped.mapping.class_grid import ClassGrid
-from jaxbiped.mapping.grid import Cell
 
 TERRAIN = {
     ".": Cell.FLOOR,  # passable

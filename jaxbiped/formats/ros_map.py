@@ -30,11 +30,10 @@ from PIL import Image, UnidentifiedImageError
 from pydantic import Field, model_validator
 
 from jaxbiped.config import Model, parse
+from jaxbiped.core.class_grid import Cell, ClassGrid
 from jaxbiped.core.image_depth import no_chatter, sample_bits
 from jaxbiped.errors import InputError
 from jaxbiped.files import read_yaml, reason
-from jaxbiped.mapping.class_grid import ClassGrid
-from jaxbiped.mapping.grid import Cell
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
 PICTURES = (".png", ".pgm")

@@ -1,8 +1,7 @@
-"""The grid's words: classes of a cell, its layout, and the body that it is read for."""
+"""The layout of a grid map, and the body that it is read for."""
 
 from __future__ import annotations
 
-import enum
 import math
 from dataclasses import dataclass, fields
 
@@ -12,21 +11,12 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.core import checks
+from jaxbiped.core.class_grid import MOST_CELLS
+from jaxbiped.core.class_grid import Cell as Cell
 from jaxbiped.errors import InputError
 
 EXACT = 2**24  # integers up to here are float32 numbers
 MOST_GROUNDS = 24  # ground levels: 32 fit a mask, and above the highest there is room for a step, and more
-MOST_CELLS = 4_000_000  # of a grid: more than a map of this kind ever has, and what memory holds
-
-
-class Cell(enum.IntEnum):
-    """Class of a cell of the 2D grid map (paper, 2.2)."""
-
-    UNMEASURED = 0
-    FLOOR = 1
-    BUMP = 2
-    GATE = 3
-    OBSTACLE = 4
 
 
 @dataclass(frozen=True)

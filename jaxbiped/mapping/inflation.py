@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 
 

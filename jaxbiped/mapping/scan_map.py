@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Float32, Int64
 
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.config import ONE_LOOK as ONE_LOOK
 from jaxbiped.mapping.config import SCAN as SCAN
 from jaxbiped.mapping.config import ChartConfig as ChartConfig

@@ -11,7 +11,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.report.pictures import CENTIMETRES, COLOURS, INK, METRES, Axis, draw_map, hillshade, save_figure
 from jaxbiped.report.style import own_style

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Affine2D
 
 from jaxbiped.arenas.arena import DISC_RADIUS, SQUARE_SIDE
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.files import write_whole
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import Ground, Mark, MissionLog, Outline
 from jaxbiped.report.axis import CENTIMETRES as CENTIMETRES

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from jaxbiped import cli
 from jaxbiped.commands import classify
 from jaxbiped.commands.classify import ClassifyArgs
+from jaxbiped.core import class_grid
 from jaxbiped.errors import InputError
 from jaxbiped.formats.cloud import save_ply
-from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.gravity import FRAMES
 from jaxbiped.mapping.grid import Cell
 

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 
 from jaxbiped import cli
+from jaxbiped.core import class_grid
 from jaxbiped.formats import load_elevation
-from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.grid import Cell
 
 F, B, X, U = Cell.FLOOR, Cell.BUMP, Cell.OBSTACLE, Cell.UNMEASURED

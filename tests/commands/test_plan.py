@@ -15,10 +15,10 @@ from scipy.sparse.csgraph import dijkstra
 from jaxbiped.commands import plan
 from jaxbiped.commands.plan import PlanArgs
 from jaxbiped.commands.scenario import ROUNDING, lengths
+from jaxbiped.core import class_grid
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.formats import moving_ai
-from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from tests.data.make_maps import graph
 

@@ -16,8 +16,8 @@ from jaxbiped.commands import stereo
 from jaxbiped.commands.map_source import open_map
 from jaxbiped.commands.stereo import StereoArgs
 from jaxbiped.config import load_toml
+from jaxbiped.core import class_grid
 from jaxbiped.errors import InputError
-from jaxbiped.mapping import class_grid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.scan_map import ONE_LOOK, lay_out, make_chart
 from jaxbiped.motion.config import RobotConfig

@@ -9,9 +9,9 @@ import pytest
 import yaml
 from PIL import Image
 
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.formats import ros_map
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mapping.inflation import inflate
 

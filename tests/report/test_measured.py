@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from jaxbiped.mapping.class_grid import ClassGrid
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.report import measured
 from jaxbiped.report.measured import LOOK, block_faces, exposed_count, halved, save_classes, save_disparity, save_voxels
 

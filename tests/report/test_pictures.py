@@ -13,8 +13,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
-from jaxbiped.mapping.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import Ground, Mark, MissionLog, Outline, Picture
 from jaxbiped.report import animation, pictures

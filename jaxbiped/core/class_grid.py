@@ -1,7 +1,8 @@
-"""A classed 2D grid map as a file: what `classify` and `stereo` write and `plan` reads."""
+"""A classed 2D grid map, and its file: what `classify` and `stereo` write and `plan` reads."""
 
 from __future__ import annotations
 
+import enum
 import math
 import warnings
 import zipfile
@@ -14,9 +15,19 @@ from jaxtyping import Float, Float64, Int, Int8
 
 from jaxbiped.errors import InputError
 from jaxbiped.files import reason, write_whole
-from jaxbiped.mapping.grid import Cell
 
 KEYS = ("classes", "levels", "origin_xy", "pitch")
+MOST_CELLS = 4_000_000  # of a grid: more than a map of this kind ever has, and what memory holds
+
+
+class Cell(enum.IntEnum):
+    """Class of a cell of the 2D grid map (paper, 2.2)."""
+
+    UNMEASURED = 0
+    FLOOR = 1
+    BUMP = 2
+    GATE = 3
+    OBSTACLE = 4
 
 
 @dataclass(frozen=True)

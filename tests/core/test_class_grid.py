@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from jaxbiped import files
+from jaxbiped.core import class_grid
+from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
-from jaxbiped.mapping import class_grid
-from jaxbiped.mapping.class_grid import ClassGrid
 
 
 def fields(**changes):
