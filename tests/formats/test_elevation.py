@@ -80,7 +80,7 @@ def test_asc_variants(tmp_path):
     assert two.origin_xy.tolist() == [0.5, 0.5]
 
 
-@pytest.mark.parametrize("what, content", same(ASC.encode()))
+@pytest.mark.parametrize("what, content", list(same(ASC.encode())))
 def test_asc_reads_the_same(tmp_path, what, content):
     np.testing.assert_array_equal(load_elevation(saved(tmp_path, "a.asc", content)).heights[0], [1, 2, 3], what)
 
