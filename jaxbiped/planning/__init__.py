@@ -11,5 +11,6 @@ lazy_package(
         "gradient": "MoveCounts move_counts path_cost",
         "heading": "HeadingField Moves Times heading_field heading_moves heading_path path_time",
         "path": "Path next_step read_path",
+        "path_search": "PathSearch ShortestPath shortest_path",
     },
 )

@@ -121,8 +121,8 @@ def _cost_to_go(inputs, method: str) -> CostToGo:
 
 @ready_jit(static_argnames=("method",))
 def _field(inputs, method: str) -> CostToGo:
-    if method == "line_sweep":
-        return _from_grids(*inputs)
+    if method != "wavefront":
+        return _from_grids(*inputs, method)
 
     def chunk(classes, levels, each, goal):
         costs, rules = each
@@ -133,18 +133,19 @@ def _field(inputs, method: str) -> CostToGo:
     return _by_chunks(chunk, inputs)
 
 
-def _from_grids(classes, levels, each, goal_ij) -> CostToGo:
-    """Line sweeps, where the kernel itself computes edge costs for a few arenas at a time."""
-    read, valid = _tables(each)
+def _from_grids(classes, levels, each, goal_ij, method: str) -> CostToGo:
+    """Kernels that compute edge costs themselves: line sweeps for a few arenas at a time, and Dijkstra's method."""
+    solve = kernels.solve_grids if method == "line_sweep" else kernels.solve_maps
+    read, valid = valid_tables(each)
     valid &= are_classes(classes)
     goal_ij = jnp.where(valid[:, None], goal_ij, -1)
     with jax.enable_x64(True):
-        cost, steps, settled = kernels.solve_grids(read, classes, levels, goal_ij)
+        cost, steps, settled = solve(read, classes, levels, goal_ij)
         return CostToGo(cost, steps, valid & settled)
 
 
 @jax.jit
-def _tables(each):
+def valid_tables(each):
     """`tables` of costs and rules, and which costs are valid."""
     costs, valid = _checked(each[0])
     return tables(costs, each[1]), valid
@@ -185,11 +186,13 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
         return by_rows(solve, mesh_of(devices), method=method)(inputs)
     if traced:
         return _differentiated(solve, method)(jax.tree.map(jnp.asarray, inputs))
-    if batch <= CHUNK or jax.default_backend() != "cpu":
+    dijkstra = solve is _field and method == "dijkstra"  # one map after the other: any number is a piece
+    if (batch <= CHUNK and not dijkstra) or jax.default_backend() != "cpu":
         return solve(jax.tree.map(jnp.asarray, inputs), method)
-    size = min(batch, CHUNK * -(-batch // (CHUNK * PIECES * cores())))
+    least = 1 if dijkstra else CHUNK
+    size = min(batch, least * -(-batch // (least * PIECES * cores())))
     out = CostToGo(kernels.aligned((batch, *grid), np.float32), np.empty(batch, np.int32), np.empty(batch, bool))
-    direct = solve is _field and method == "line_sweep"
+    direct = dijkstra or (solve is _field and method == "line_sweep")
     inputs, valid = _prepared(inputs) if direct else (jax.tree.map(np.asarray, inputs), True)
 
     def piece(start):
@@ -197,12 +200,15 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
         rows = slice(stop - size, stop)  # the last piece overlaps the one before: one program
         part = jax.tree.map(lambda a: a[rows], inputs)
         if direct:
-            kernels.solve_arrays(*part, out.cost[rows], out.iterations[rows], out.converged[rows])
+            kernels.solve_arrays(method, *part, out.cost[rows], out.iterations[rows], out.converged[rows])
         else:
             jax.tree.map(lambda whole, a: np.copyto(whole[rows], a), out, solve(part, method))
 
-    with ThreadPoolExecutor(cores()) as pool:
-        list(pool.map(piece, range(0, batch, size)))
+    if batch <= size:
+        piece(0)
+    else:
+        with ThreadPoolExecutor(cores()) as pool:
+            list(pool.map(piece, range(0, batch, size)))
     out.converged[:] &= valid
     return jax.device_put(out)  # adopts arrays without a copy, unlike `jnp.asarray`
 
@@ -210,7 +216,7 @@ def _on_all_cores(solve, inputs, method: str, devices=None) -> CostToGo:
 def _prepared(inputs):
     """Arguments of `kernels.solve_arrays`, except its results; and which arenas are valid."""
     classes, levels, each, goal_ij = inputs
-    read, valid = _tables(each)
+    read, valid = valid_tables(each)
     valid = np.asarray(valid)
     goal_ij = np.where(valid[:, None], goal_ij, np.int32(-1))
     grids = (np.ascontiguousarray(a) for a in (classes, levels))

@@ -146,6 +146,12 @@ def room_size(height, width):
     return (height + 2) * (width + 2) * LANES
 
 
+def rooms(height: int, width: int) -> tuple[tuple[int, type], ...]:
+    """Size and dtype of the arrays to work in."""
+    size = room_size.py_func(height, width)  # compiling it would take longer
+    return (size, np.float64), (4 * size, np.float32), (3 * size, np.int8)
+
+
 def solver():
     """`solve_all` as `xla_ffi.register` wants it: the first six arrays are arguments, the other six results."""
     solve_all = make_solver()

@@ -12,7 +12,7 @@ from numba import carray, njit
 
 from jaxbiped.core import xla_ffi
 from jaxbiped.core.ready_programs import TARGETS
-from jaxbiped.planning.kernels import dijkstra, grids, line_sweep
+from jaxbiped.planning.kernels import dijkstra, grids, line_sweep, map_dijkstra, map_search
 from jaxbiped.planning.kernels.line_sweep import LANES
 from jaxbiped.planning.kernels.names import METHODS as METHODS
 
@@ -64,7 +64,11 @@ def solver(solve_lanes, lanes: int):
 
 
 LINE = 64  # [bytes] of the cache
-GRIDS = "grids"  # line sweeps straight from grids
+GRIDS, MAPS = "grids", "maps"  # straight from grids: line sweeps, and Dijkstra
+
+
+READ, SEARCH = "read", "search"  # one map, and paths on it
+WHOLE = {GRIDS: grids.solver, MAPS: map_dijkstra.solver, READ: map_search.reader, SEARCH: map_search.searcher}
 
 
 def target(kernel: str) -> tuple[str, int]:
@@ -81,8 +85,8 @@ def registered(kernel: str) -> tuple[str, int]:
     """The name by which XLA knows a kernel, and its lanes; compiled at the first call."""
     name, lanes = f"jaxbiped_{kernel}", 1 if kernel == "dijkstra" else LANES
     TARGETS[name] = __name__, (kernel,)
-    if kernel == GRIDS:
-        xla_ffi.register(name, grids.solver(), keep=True)
+    if kernel in WHOLE:
+        xla_ffi.register(name, WHOLE[kernel](), keep=True)
     else:
         solve_lanes = dijkstra.solve_arena if kernel == "dijkstra" else line_sweep.sweeps(lanes)
         xla_ffi.register(name, solver(solve_lanes, lanes), keep=True)
@@ -130,37 +134,50 @@ def solve_grids(tables, classes, levels, goal_ij):
         xla_ffi.expect(array, shape, dtype)
     if batch < lanes:
         inputs = [jnp.pad(a, ((0, lanes - batch),) + ((0, 0),) * (a.ndim - 1)) for a in inputs]
-    many, size = max(batch, lanes), grids.room_size.py_func(height, width)
-    results = (
-        jax.ShapeDtypeStruct((many, height, width), jnp.float32),
-        jax.ShapeDtypeStruct((many,), jnp.int32),
-        jax.ShapeDtypeStruct((many,), jnp.bool_),
-        jax.ShapeDtypeStruct((size,), jnp.float64),
-        jax.ShapeDtypeStruct((4 * size,), jnp.float32),
-        jax.ShapeDtypeStruct((3 * size,), jnp.int8),
-    )
-    cost, steps, settled, *_ = jax.ffi.ffi_call(name, results)(*inputs)
+    many = max(batch, lanes)
+    cost, steps, settled, *_ = jax.ffi.ffi_call(name, results_of(many, height, width, grids.rooms))(*inputs)
     return cost[:batch], steps[:batch], settled[:batch]
 
 
-def solve_arrays(tables, classes, levels, goal_ij, cost, steps, settled) -> None:
-    """`solve_grids` of NumPy arrays, of no fewer arenas than lanes; results go into `cost`, `steps` and `settled`.
+def results_of(batch: int, height: int, width: int, rooms) -> tuple[jax.ShapeDtypeStruct, ...]:
+    """What a kernel that reads grids returns: costs, steps, whether they are exact, and its room to work in."""
+    return (
+        jax.ShapeDtypeStruct((batch, height, width), jnp.float32),
+        jax.ShapeDtypeStruct((batch,), jnp.int32),
+        jax.ShapeDtypeStruct((batch,), jnp.bool_),
+        *(jax.ShapeDtypeStruct((size,), dtype) for size, dtype in rooms(height, width)),
+    )
 
-    From other threads it runs at the same time.
-    """
+
+def solve_maps(tables, classes, levels, goal_ij):
+    """`solve_grids` by Dijkstra's method, one map after the other: arguments and results of any batch."""
+    name, _ = target(MAPS)
     batch, height, width = classes.shape
+    inputs = (classes, levels, *tables, goal_ij)
+    for array, (shape, dtype) in zip(inputs, grids.layout(batch, height, width), strict=True):
+        xla_ffi.expect(array, shape, dtype)
+    cost, steps, settled, *_ = jax.ffi.ffi_call(name, results_of(batch, height, width, map_dijkstra.rooms))(*inputs)
+    return cost, steps, settled
+
+
+def solve_arrays(method: str, tables, classes, levels, goal_ij, cost, steps, settled) -> None:
+    """`solve_grids` or `solve_maps` of NumPy arrays; results go into `cost`, `steps` and `settled`.
+
+    From other threads it runs at the same time. Line sweeps need as many arenas as they have lanes.
+    """
+    kernel, (batch, height, width) = GRIDS if method == "line_sweep" else MAPS, classes.shape
     inputs = (classes, levels, *tables, goal_ij)
     results = ((cost, classes.shape, np.float32), (steps, (batch,), np.int32), (settled, (batch,), np.bool_))
     for array, (shape, dtype) in zip(inputs, grids.layout(batch, height, width), strict=True):
         xla_ffi.expect(array, shape, dtype)
     for array, shape, dtype in results:
         xla_ffi.expect(array, shape, dtype)
-    if batch < LANES or not all(array.flags.c_contiguous for array in (*inputs, cost, steps, settled)):
-        raise ValueError(f"needs at least {LANES} arenas, in contiguous arrays")
-    size = grids.room_size.py_func(height, width)  # compiling it would take longer
-    name, _ = target(GRIDS)
-    room = aligned(size, np.float64), aligned(4 * size, np.float32), aligned(3 * size, np.int8)
-    xla_ffi.call(name, inputs, (cost, steps, settled, *room))
+    least = LANES if kernel == GRIDS else 1
+    if batch < least or not all(array.flags.c_contiguous for array in (*inputs, cost, steps, settled)):
+        raise ValueError(f"needs at least {least} arenas, in contiguous arrays")
+    rooms = grids.rooms(height, width) if kernel == GRIDS else map_dijkstra.rooms(height, width)
+    name, _ = target(kernel)
+    xla_ffi.call(name, inputs, (cost, steps, settled, *(aligned(size, dtype) for size, dtype in rooms)))
 
 
 def aligned(shape, dtype) -> np.ndarray:
