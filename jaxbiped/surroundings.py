@@ -11,6 +11,7 @@ import os
 import re
 import subprocess
 import sys
+import traceback
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -112,7 +113,18 @@ def culprit(error: Exception) -> InputError | None:
     for name, value in os.environ.items():
         if name.startswith(READ) and value and re.search(rf"\b{name}\b", said, re.IGNORECASE):
             return InputError(f"cannot be used: {said}", field=name, value=value)
-    return None
+    return named_window_system(error)
+
+
+def named_window_system(error: BaseException) -> InputError | None:
+    """The one-line error about `MUJOCO_GL` if MuJoCo failed to import the library that it names, of which it raises
+    whatever that library does: for OSMesa an `AttributeError` about `glGetError`."""
+    asked = os.environ.get("MUJOCO_GL", "")
+    files = [frame.filename for frame in traceback.extract_tb(error.__traceback__)]
+    if not asked or not any(Path(file).parts[-3:] == ("rendering", "classic", "gl_context.py") for file in files):
+        return None
+    said = first_line(error) or type(error).__name__
+    return InputError(f"its library cannot be loaded: {said}", field="MUJOCO_GL", value=asked)
 
 
 def first_line(error: Exception) -> str:

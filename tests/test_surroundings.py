@@ -156,6 +156,18 @@ def test_a_window_system_that_mujoco_does_not_know_is_named(tmp_path):
     assert status == 2 and len(said) == 1 and "MUJOCO_GL" in said[0] and "nonsense" in said[0]
 
 
+@pytest.mark.parametrize("command", ["native", "stereo"])
+def test_a_window_system_whose_library_is_missing_is_named(tmp_path, command):
+    """PyOpenGL raises an AttributeError where OSMesa is not installed, at MuJoCo's import."""
+    (tmp_path / "OpenGL").mkdir()
+    (tmp_path / "OpenGL/__init__.py").write_text("None.glGetError")
+    scene, option = str(ROOT / "configs/scenes/experiment_5.toml"), "--sensor" if command == "stereo" else "--executor"
+    places = {"PYTHONPATH": f"{tmp_path}:{ROOT}", "MUJOCO_GL": "osmesa"}
+    status, said = child(tmp_path, "run", scene, option, command, module="jaxbiped", **places)
+    assert status == 2 and len(said) == 1
+    assert said[0].startswith("jaxbiped: MUJOCO_GL: its library cannot be loaded: 'NoneType'") and "osmesa" in said[0]
+
+
 @pytest.mark.slow  # two processes, each of which compiles the closed loop
 def test_rows_of_a_comparison_are_the_same_in_any_shell(tmp_path):
     words = ["compare", "--arenas", "4", "--strategies", "full", "floor_only", "--sensor", "oracle", "--out"]

@@ -8,14 +8,20 @@ import sys
 import threading
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 from jaxtyping import Float, Float32, UInt8
 
+from jaxbiped import surroundings
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.errors import InputError
 from jaxbiped.sensing.config import CameraConfig
-from jaxbiped.stereo.scene import arena_model
+
+try:
+    import mujoco
+
+    from jaxbiped.stereo.scene import arena_model
+except Exception as error:  # of whatever library MUJOCO_GL names
+    raise surroundings.named_window_system(error) or error from None
 
 NEAR, FAR = 0.01, 20.0  # [m] range of rendered depths
 SAMPLES = 4  # samples per pixel of an image

@@ -136,8 +136,8 @@ import sys, numpy as np
 from jaxbiped.arenas import load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.sensing.config import CameraConfig
-from jaxbiped.stereo.renderer import Renderer
 try:
+    from jaxbiped.stereo.renderer import Renderer
     eye = Renderer(CameraConfig())
 except InputError:
     sys.exit(7)
