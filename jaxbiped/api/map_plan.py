@@ -49,12 +49,8 @@ def plan(
     for name, cell in zip(("start_xy", "goal_xy"), cells, strict=True):
         if grid.classes[cell] == planning.costs.Cell.OBSTACLE:
             raise InputError("must not be on an obstacle", field=name, value=list(cell))
-    start, goal = (np.array(cell, np.int32) for cell in cells)
-    edges = planning.edge_costs(grid.classes, grid.levels, costs, rules)
-    to_go = planning.field(grid.classes, grid.levels, costs, rules, goal)
-    path = planning.read_path(to_go, edges, start, int(np.prod(grid.shape)))
-    if not bool(path.valid):
+    path = planning.shortest_path(grid.classes, grid.levels, costs, rules, start_ij=cells[0], goal_ij=cells[1])
+    if path is None:
         return None
-    cells_ij = np.asarray(path.cells_ij)[: int(path.length) + 1]
-    local = (cells_ij[:, ::-1] + 0.5) * grid.pitch
-    return PlannedPath(cells_ij, grid.origin_xy + local @ grid.axes.T, float(path.cost))
+    local = (path.cells_ij[:, ::-1] + 0.5) * grid.pitch
+    return PlannedPath(path.cells_ij, grid.origin_xy + local @ grid.axes.T, path.cost)

@@ -8,7 +8,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import jax
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -16,16 +15,14 @@ from jaxbiped.commands.map_source import MapSource, open_map
 from jaxbiped.commands.options.plan import PlanArgs
 from jaxbiped.commands.scenario import check_scenario
 from jaxbiped.config import config_hash, load
-from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.motion.config import RobotConfig
-from jaxbiped.planning import DIRECTIONS, Costs, Rules, edge_costs, field, next_step
+from jaxbiped.planning import DIRECTIONS, Costs, PathSearch, Rules
 from jaxbiped.terminal import legible
 
 NO_PATH = 1  # exit status
-MOVES_AT_ONCE = 256  # read from a field in one compiled call
 
 
 @dataclass(frozen=True)
@@ -36,7 +33,7 @@ class Plan:
     costs: Float[np.ndarray, "n"]  # accumulated up to each cell
     length: float  # [cells] 1 straight, sqrt(2) diagonal
     turns: int  # changes of direction
-    seconds: float  # [s] the field and the path, compiled
+    seconds: float  # [s] to read the map and to search the path, compiled
     compile_seconds: float  # [s] extra time of the first call
 
 
@@ -96,57 +93,23 @@ def check_options(args: PlanArgs) -> None:
             raise InputError(message, field=name, value=getattr(args, name))
 
 
-def solve(classes, levels, costs, rules, goal_ij):
-    """Edge costs and cost-to-go of one map; not in one program, which makes the planner slower on large maps."""
-    edges = jax.jit(edge_costs)(classes[None], levels[None], costs, rules)
-    return edges[0], field(classes[None], levels[None], costs, rules, goal_ij).cost
-
-
-steps = jax.jit(next_step, static_argnames="length")
-
-
 def find(
     source: MapSource, start_ij: tuple[int, int], goal_ij: tuple[int, int], costs: Costs, rules: Rules
 ) -> Plan | None:
-    """The best path between two free cells, or None if there is none.
-
-    Raises:
-      InputError: costs so different in size that float32 cannot distinguish the cells of the path.
-    """
+    """The best path between two free cells, or None if there is none."""
     grid = source.grid
-    start, goal = np.array([start_ij], np.int32), np.array([goal_ij], np.int32)
-    (edges, to_go), first, seconds = timed(lambda: solve(grid.classes, grid.levels, costs, rules, goal))
-    if not np.isfinite(to_go[0][start_ij]):
+    search, first, seconds = timed(lambda: PathSearch(grid.classes, grid.levels, costs, rules))
+    path, first_path, seconds_path = timed(lambda: search.path(start_ij, goal_ij))
+    if path is None:
         return None
-    directions, first_read, seconds_read = timed(lambda: read(grid, to_go, costs, rules, start))
-    cells = np.concatenate([start, start + np.cumsum(DIRECTIONS[directions], axis=0)])
-    if tuple(cells[-1].tolist()) != goal_ij:
-        message = "must not exceed the other costs by so much: single precision cannot resolve the path on this map"
-        raise InputError(message, field="c4", value=float(costs.c4))
-    prices = np.asarray(edges, np.float64)[directions, *cells[:-1].T]
-    lengths = np.hypot(*DIRECTIONS[directions].T.astype(float))
     return Plan(
-        cells_ij=cells,
-        costs=np.concatenate([[0.0], np.cumsum(prices)]),
-        length=float(lengths.sum()),
-        turns=int(np.count_nonzero(np.diff(directions))),
-        seconds=seconds + seconds_read,
-        compile_seconds=first + first_read - seconds - seconds_read,
+        cells_ij=path.cells_ij,
+        costs=path.so_far,
+        length=float(np.hypot(*DIRECTIONS[path.directions].T.astype(float)).sum()),
+        turns=int(np.count_nonzero(np.diff(path.directions))),
+        seconds=seconds + seconds_path,
+        compile_seconds=first + first_path - seconds - seconds_path,
     )
-
-
-def read(grid: ClassGrid, to_go, costs: Costs, rules: Rules, start_ij: Int[np.ndarray, "1 2"]) -> Int[np.ndarray, "n"]:
-    """Directions of all moves of the path, read in slices, so that its length need not be known."""
-    moves, ij, heading = np.zeros(0, np.int64), start_ij, np.array([-1], np.int32)
-    while True:
-        more = np.asarray(
-            steps(to_go, grid.classes[None], grid.levels[None], costs, rules, ij, heading, length=MOVES_AT_ONCE)
-        )[0]
-        more = more[more >= 0].astype(np.int64)
-        moves = np.concatenate([moves, more])
-        if len(more) < MOVES_AT_ONCE:
-            return moves
-        ij, heading = start_ij + DIRECTIONS[moves].sum(0).astype(np.int32), more[-1:].astype(np.int32)
 
 
 def timed(call):
@@ -154,7 +117,7 @@ def timed(call):
     seconds = []
     for _ in range(2):
         start = time.perf_counter()
-        result = jax.block_until_ready(call())
+        result = call()
         seconds.append(time.perf_counter() - start)
     return result, *seconds
 

@@ -5,62 +5,55 @@ from __future__ import annotations
 import csv
 import io
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float64, Int
 from rich.console import Console
-from rich.progress import track
+from rich.progress import Progress
 
 from jaxbiped.commands.map_source import MapSource
 from jaxbiped.core.class_grid import ClassGrid
+from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.files import new_folder, write_whole
 from jaxbiped.formats.moving_ai import load_scenario
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.planning import Costs, Rules, field
+from jaxbiped.planning import Costs, PathSearch, Rules
 
 OCTILE = Costs(1.0, 0.0, 0.0, 0.0, 0.0)  # a straight move 1, a diagonal one sqrt(2), and nothing else
-CELLS_AT_ONCE = 1 << 21  # in all maps of a chunk; 16 double-precision planes of it take 270 MB
 ROUNDING = 1e-6  # relative error of a length in float32: below 0.005 cells up to 5,000, the least by which octile
 # lengths of one query differ in practice (99 straight moves for 70 diagonal ones)
 LISTED = 10  # queries that differ, printed one by one
 DIFFER = 1  # exit status
 
 
-@jax.jit
-def costs_to(classes, levels, goals_ij):
-    """Octile length from every cell to each goal, corners never cut."""
-    batch = len(goals_ij)
-    maps = (jnp.broadcast_to(array, (batch, *array.shape)) for array in (classes, levels))
-    return field(*maps, OCTILE, Rules(corner_cutting=False), goals_ij).cost
-
-
 def lengths(
     grid: ClassGrid, start_ij: Int[np.ndarray, "Q 2"], goal_ij: Int[np.ndarray, "Q 2"], show: bool = False
 ) -> Float64[np.ndarray, "Q"]:
-    """Octile length [cells] of each query, inf where there is no path: one field per distinct goal, in chunks.
+    """Octile length [cells] of each query, inf where there is no path; one search each, on all cores.
 
     Args:
       grid: the map.
       start_ij, goal_ij: cells.
       show: draw a progress bar.
 
-    Lengths are exact up to a relative error of `ROUNDING`.
+    Lengths are exact up to a relative error of `ROUNDING`; corners are never cut.
     """
     found = np.full(len(goal_ij), np.inf)
-    goals, of_query = np.unique(goal_ij, axis=0, return_inverse=True)
-    of_query = of_query.reshape(-1)
-    size = int(np.clip(CELLS_AT_ONCE // grid.classes.size, 1, min(64, len(goals))))
-    firsts = range(0, len(goals), size)
-    for first in track(firsts, description="queries", transient=True, disable=not show, console=Console(stderr=True)):
-        chunk = goals[np.minimum(np.arange(first, first + size), len(goals) - 1)]  # the last chunk is padded: one shape
-        cost = np.asarray(costs_to(grid.classes, grid.levels, chunk.astype(np.int32)))
-        mine = np.flatnonzero((of_query >= first) & (of_query < first + size))
-        i, j = start_ij[mine].T
-        found[mine] = cost[of_query[mine] - first, i, j]
+    queues = [np.arange(first, len(found), cores()) for first in range(cores())]
+    with Progress(console=Console(stderr=True), transient=True, disable=not show) as bar:
+        task = bar.add_task("queries", total=len(found))
+
+        def work(queue: Int[np.ndarray, "q"]) -> None:
+            search = PathSearch(grid.classes, grid.levels, OCTILE, Rules(corner_cutting=False))
+            for q in queue:
+                found[q] = search.cost(start_ij[q], goal_ij[q])
+                bar.advance(task)
+
+        with ThreadPoolExecutor(cores()) as pool:
+            list(pool.map(work, queues))
     return found
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from jaxtyping import Int, Int8
+from jaxtyping import Float64, Int, Int8
 
 from jaxbiped.core import xla_ffi
 from jaxbiped.core.checks import cells
@@ -16,8 +16,8 @@ from jaxbiped.errors import InputError
 from jaxbiped.planning import kernels
 from jaxbiped.planning.arguments import grid_arguments, indices
 from jaxbiped.planning.cost_field import field, valid_tables
-from jaxbiped.planning.costs import DIRECTIONS, Costs, Rules, edge_costs
-from jaxbiped.planning.kernels import map_search
+from jaxbiped.planning.costs import DIRECTIONS, STEP, Costs, Rules, edge_costs
+from jaxbiped.planning.kernels import map_moves, map_search
 from jaxbiped.planning.path import TIE, read_path
 
 
@@ -27,7 +27,8 @@ class ShortestPath:
 
     cells_ij: Int[np.ndarray, "L1 2"]  # from start to goal
     directions: Int8[np.ndarray, "L"]  # move from cell k to cell k + 1
-    cost: float  # by Eq. 1, rounded to float32 like fields
+    so_far: Float64[np.ndarray, "L1"]  # cost by Eq. 1 up to each cell, summed from the start
+    cost: float  # by Eq. 1, summed from the goal and rounded to float32 like fields
     expanded: int  # cells of which neighbours were looked at
 
 
@@ -79,8 +80,7 @@ class PathSearch:
             return self._whole(start_ij, goal_ij, heading)
         if answer == map_search.NONE:
             return None
-        steps = np.concatenate([np.asarray(start_ij, np.int64)[None], DIRECTIONS[moves]])
-        return ShortestPath(np.cumsum(steps, 0), moves, cost, expanded)
+        return self._path(np.asarray(start_ij), moves, cost, expanded)
 
     def cost(self, start_ij: Any, goal_ij: Any) -> float:
         """The least cost by Eq. 1, inf without a path; arguments as for `path`."""
@@ -118,9 +118,18 @@ class PathSearch:
         path = read_path(to_go, edge_costs(*grids), np.asarray(start_ij), self.classes.size, heading)
         if not bool(path.valid):
             return None
-        length = int(path.length)
-        cells_ij, moves = np.asarray(path.cells_ij)[: length + 1], np.asarray(path.directions)[:length]
-        return ShortestPath(cells_ij.astype(np.int64), moves, float(path.cost), self.classes.size)
+        moves = np.asarray(path.directions)[: int(path.length)]
+        return self._path(np.asarray(start_ij), moves, float(path.cost), self.classes.size)
+
+    def _path(self, start_ij, moves: Int8[np.ndarray, "L"], cost: float, expanded: int) -> ShortestPath:
+        """The path of these moves, each with its price."""
+        cells_ij = np.cumsum(np.concatenate([start_ij.astype(np.int64)[None], DIRECTIONS[moves]]), 0)
+        grid = (map_moves.PARTS, *(size + 2 for size in self.shape))
+        kind, level, *_ = (part[tuple(cells_ij.T + 1)] for part in self._rooms[0].reshape(grid))
+        worse = np.maximum(kind[1:], kind[:-1])
+        worse = np.where(level[1:] != level[:-1], np.maximum(worse, STEP), worse)
+        prices = self._prices[moves % 2, worse].astype(np.float64)
+        return ShortestPath(cells_ij, moves, np.concatenate([[0.0], np.cumsum(prices)]), cost, expanded)
 
 
 def shortest_path(
