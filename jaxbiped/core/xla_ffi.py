@@ -25,6 +25,8 @@ if config.DISABLE_JIT:  # the command line overrides it; a script's own setting 
 FRAME_EXTENSION, FRAME_ARGUMENT_COUNT, FRAME_ARGUMENTS, FRAME_RESULTS = 1, 7, 9, 14
 BUFFER_DATA, BUFFER_RANK, BUFFER_SHAPE = 3, 4, 5
 EXTENSION_TYPE, EXTENSION_METADATA, METADATA_VERSION = 1, 3, 3
+# Functions that only each other call: wrappers for Python would take half the time to compile.
+compiled = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 METADATA = 1  # type of the extension with which XLA asks for which version of the interface a function was written
 VERSION = np.uint64(1 << 32)  # major 0 in the lower half of the word, minor 1 in the upper
 
@@ -39,37 +41,37 @@ def pointer(context, address):
     return types.voidptr(types.uint64), generate
 
 
-@njit
+@compiled
 def words(address, count):
     """The `count` words of 8 bytes at an address."""
     return carray(pointer(address), (count,), np.uint64)
 
 
-@njit
+@compiled
 def data(buffers, k):
     """The address of the elements of buffer number `k` of the list of buffers at address `buffers`."""
     return words(words(buffers, k + 1)[k], BUFFER_DATA + 1)[BUFFER_DATA]
 
 
-@njit
+@compiled
 def array(buffers, k, size, dtype):
     """The first `size` elements of buffer number `k`, flat."""
     return carray(pointer(data(buffers, k)), (size,), dtype)
 
 
-@njit
+@compiled
 def shape(buffers, k):
     """Its sizes along its axes, as many of the words as it has axes."""
     return words(words(words(buffers, k + 1)[k], BUFFER_SHAPE + 1)[BUFFER_SHAPE], 8)
 
 
-@njit
+@compiled
 def rank(buffers, k):
     """The number of its axes."""
     return np.int64(words(words(buffers, k + 1)[k], BUFFER_RANK + 1)[BUFFER_RANK])
 
 
-@njit
+@compiled
 def answered(frame):
     """Whether this call only asked for the version of the interface, which is now told."""
     if frame[FRAME_EXTENSION] == 0:

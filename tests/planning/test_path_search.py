@@ -5,6 +5,7 @@ import threading
 import jax
 import numpy as np
 import pytest
+from numba import njit
 
 from jaxbiped import planning
 from jaxbiped.errors import InputError
@@ -95,15 +96,21 @@ def test_a_pool_that_fills_is_emptied_of_cells_that_were_improved_since():
     levels = (classes == 2).astype(np.int8)
     search = PathSearch(classes, levels)
     whole = np.asarray(planning.field(classes, levels, goal_ij=(20, 20)).cost)
-    size, room = 42 * 42, bucket_queue.room_of.py_func(42 * 42)
+    size, room, goal = 42 * 42, bucket_queue.room_of.py_func(42 * 42), 21 * 42 + 21
+    advance = bucket_queue.expansion(directed=False)
+
+    @njit
+    def settle(kind, level, moves, mark, cost, prices, pool, queue):
+        bucket_queue.begin(goal, cost, mark, pool, queue)
+        aim = (0, 0.0, 0.0, 0.0)
+        advance(kind, level, moves, mark, cost, 42, prices, aim, 0.5, bucket_queue.WORDS, pool, queue, pool)
+
     kind, level, moves, mark = (search._rooms[0][k * size : (k + 1) * size] for k in range(4))
-    prices, advance, peaks = search._prices.ravel().astype(float), bucket_queue.expansion(directed=False), []
+    prices, peaks = search._prices.ravel().astype(float), []
     for _ in range(8):
         cost, pool, queue = np.full(size, np.inf), np.empty(room, np.int64), np.empty(bucket_queue.QUEUE, np.int64)
         mark[:] = 0
-        bucket_queue.begin(21 * 42 + 21, cost, mark, pool, queue)
-        aim = (0, 0.0, 0.0, 0.0)
-        advance(kind, level, moves, mark, cost, 42, prices, aim, 0.5, bucket_queue.WORDS, pool, queue, pool)
+        settle(kind, level, moves, mark, cost, prices, pool, queue)
         np.testing.assert_array_equal(cost.reshape(42, 42)[1:-1, 1:-1].astype(np.float32), whole)
         peaks.append(int(queue[bucket_queue.USED]))
         room = peaks[-1] + 6  # with less than eight to spare it is refilled

@@ -1,10 +1,9 @@
 """Sums, the greatest, and unions over the cells near each."""
 
 import numpy as np
-from numba import njit
 
-# Called by each other alone: wrappers for Python would take half the time to compile.
-compiled = njit(nogil=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
+from jaxbiped.core.xla_ffi import compiled as compiled
+
 U = np.uint64
 INF = np.float32(np.inf)
 

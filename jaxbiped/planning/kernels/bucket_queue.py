@@ -12,8 +12,8 @@ A search for one path puts cells in buckets by what a whole path through them co
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from jaxbiped.core import xla_ffi
 from jaxbiped.planning.costs import IN_GATE, LEVEL, STEP, UNMEASURED
 from jaxbiped.planning.kernels.map_moves import DI, DJ, KINDS, move_cost
 
@@ -28,13 +28,13 @@ MOST = 8  # expansions per cell before a search is abandoned: its order does not
 FINER = 8  # buckets of a search within the least cost of a move: cells in the order of their costs are rarely redone
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def room_of(size):
     """Entries of a pool for a map of `size` cells."""
     return 2 * size + 16
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def begin(goal, cost, mark, pool, queue):
     """A queue that holds the goal alone; costs are inf and marks 0 elsewhere."""
     queue[:BUCKETS] = -1
@@ -43,13 +43,13 @@ def begin(goal, cost, mark, pool, queue):
     queue[FREE], queue[USED], queue[LIVE], queue[NOW], queue[EXPANDED] = -1, 1, 1, 0, 0
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def estimate(n, start, line, straight, diagonal):
     """The least that a way from cell `n` to `start` costs on an empty map."""
     return distance(n // line - start // line, n % line - start % line, straight, diagonal)
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def distance(i, j, straight, diagonal):
     """The same, by the difference of rows and of columns."""
     i, j = abs(i), abs(j)
@@ -67,13 +67,13 @@ def expansion(directed: bool):
         `estimate` of the goal). New cells are then also listed in `touched`, and counted.
     """
 
-    @njit(nogil=True)
+    @xla_ffi.compiled
     def bucket_of(so_far, i, j, aim, per_bucket):
         if directed:
             so_far = max(so_far + distance(i, j, aim[1], aim[2]) - aim[3], 0.0)
         return np.int64(so_far * per_bucket)
 
-    @njit(nogil=True)
+    @xla_ffi.compiled
     def refill(mark, cost, line, aim, per_bucket, pool, queue):
         """Entries of waiting cells alone, where those that were improved since have filled the pool."""
         queue[:BUCKETS] = -1
@@ -86,7 +86,7 @@ def expansion(directed: bool):
                 used += 1
         queue[FREE], queue[USED], queue[LIVE] = -1, used, used
 
-    @njit(nogil=True)
+    @xla_ffi.compiled
     def advance(kind, level, moves, mark, cost, line, prices, aim, per_bucket, last, pool, queue, touched):
         free, used, live, now, expanded = queue[FREE], queue[USED], queue[LIVE], queue[NOW], queue[EXPANDED]
         offsets = (
@@ -142,7 +142,7 @@ def expansion(directed: bool):
     return advance
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def is_settled(kind, level, moves, cost, height, width, prices):
     """Whether no move lowers a cost: one more relaxation of all cells changes nothing."""
     line, lower = width + 2, 0
@@ -158,7 +158,7 @@ def is_settled(kind, level, moves, cost, height, width, prices):
     return lower == 0
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def relaxed(ends, heights, moves, bit, table, here, there):
     """1 if one of the moves between the cells of two rows lowers the cost of one of its ends, else 0."""
     (a, b), (low, high), lower = ends, heights, 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import carray, njit
+from numba import carray
 
 from jaxbiped.core import xla_ffi
 from jaxbiped.planning.kernels.bucket_queue import BUCKETS, QUEUE, WORDS, begin, expansion, is_settled, room_of
@@ -19,7 +19,7 @@ def rooms(height: int, width: int) -> tuple[tuple[int, type], ...]:
     return (size, np.float64), (PARTS * size, np.int8), (pool, np.int64), (QUEUE, np.int64)
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def solve_map(
     classes, levels, first, kinds_of, prices, cutting, goal_i, goal_j, height, width, cost, bytes, pool, queue
 ):
@@ -46,7 +46,7 @@ def solver():
     Arguments as `grids.layout`; results: field float32 [B, H, W], steps int32 [B], settled bool [B], and `rooms`.
     """
 
-    @njit
+    @xla_ffi.compiled
     def solve(arguments, count, results):
         dims = xla_ffi.shape(results, 0)
         batch, height, width = np.int64(dims[0]), np.int64(dims[1]), np.int64(dims[2])

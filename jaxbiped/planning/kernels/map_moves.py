@@ -7,8 +7,8 @@ table of costs by the worse of two ends.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from jaxbiped.core import xla_ffi
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import DIRECTIONS, FORBIDDEN, STEP, UNMEASURED
 
@@ -18,13 +18,13 @@ KINDS = FORBIDDEN + 1  # of moves
 PARTS = 4  # arrays of bytes per map: `parts`
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def parts(bytes, size):
     """The kind and the level of each cell, its allowed moves, one bit a direction, and room for a mark of it."""
     return bytes[:size], bytes[size : 2 * size], bytes[2 * size : 3 * size], bytes[3 * size : 4 * size]
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def read_map(classes, levels, first, kinds_of, cutting, height, width, bytes):
     """Fill `parts`, grids with a ring of one cell, from the map that begins at element `first`; marks become 0.
 
@@ -62,7 +62,7 @@ def read_map(classes, levels, first, kinds_of, cutting, height, width, bytes):
     mark[:] = 0
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def join(ends, heights, sides, cutting, bit, found):
     """Set `bit` of each cell of a row from which a robot may go to the other end, with `sides` free or not beside it.
 
@@ -76,7 +76,7 @@ def join(ends, heights, sides, cutting, bit, found):
         found[j] |= bit * (joined & (side != 0))
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def move_cost(kind, level, prices, a, b, k):
     """What the allowed move in direction `k` from cell `a` to cell `b` costs; prices [2 * KINDS]."""
     worse = max(kind[a], kind[b])
@@ -85,7 +85,7 @@ def move_cost(kind, level, prices, a, b, k):
     return prices[(k & 1) * KINDS + worse]
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def range_of(prices):
     """The least and the greatest cost that is not inf; (inf, 0) if there is none."""
     least, most = np.inf, 0.0

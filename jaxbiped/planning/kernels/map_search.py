@@ -7,7 +7,6 @@ before each move, the search is carried so far that no cell which it has not set
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from jaxbiped.core import xla_ffi
 from jaxbiped.planning.kernels.bucket_queue import (
@@ -48,7 +47,7 @@ def reader():
     cut, int8 [1]. Results: `rooms`, with a cost of inf everywhere.
     """
 
-    @njit
+    @xla_ffi.compiled
     def read(arguments, count, results):
         dims = xla_ffi.shape(arguments, 0)
         height, width = np.int64(dims[0]), np.int64(dims[1])
@@ -65,7 +64,7 @@ def reader():
     return read
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def least_moves(prices):
     """The least cost of a straight and of a diagonal move, neither more than a detour by the other."""
     straight, _ = range_of(prices[:KINDS])
@@ -74,7 +73,7 @@ def least_moves(prices):
     return min(straight, diagonal), diagonal
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def search(kind, level, moves, mark, cost, line, prices, tie, start, goal, heading, pool, queue, touched, path):
     """(answer, number of moves): the moves from `start` to `goal` are then in `path`, if it has room for them.
 
@@ -98,36 +97,33 @@ def search(kind, level, moves, mark, cost, line, prices, tie, start, goal, headi
     aim = (start, straight, diagonal, estimate(goal, start, line, straight, diagonal))
     per_bucket = min(FINER / least, (BUCKETS - 4) / (most + diagonal))
     limit = MOST * len(cost)
-    advance(kind, level, moves, mark, cost, line, exact, aim, per_bucket, UNTIL_FOUND, pool, queue, touched)
-    if queue[EXPANDED] > limit:
-        return ABANDONED, 0
-    if cost[start] == np.inf:
-        return NONE, 0
-    last = np.int64(max(cost[start] - aim[3], 0.0) * (1 + MARGIN) * per_bucket) + 1
-    advance(kind, level, moves, mark, cost, line, exact, aim, per_bucket, last, pool, queue, touched)
-    if heading == COST_ONLY:
-        return FOUND, 0
-    n, length, walked = start, 0, 0.0
+    last, n, length, walked = UNTIL_FOUND, start, 0, 0.0
     while n != goal:
-        # No path through a neighbour that is as good as the best one costs more than this; the estimate of that
-        # neighbour is at most what was walked and the move to it.
-        last = np.int64(max(walked + cost[n] - aim[3], 0.0) * (1 + MARGIN) * per_bucket) + 1
-        if queue[NOW] <= last and queue[LIVE] > 0:
-            advance(kind, level, moves, mark, cost, line, exact, aim, per_bucket, last, pool, queue, touched)
-            if queue[EXPANDED] > limit:
-                return ABANDONED, 0
-        heading = pick(kind, level, moves, cost, line, prices, tie, n, heading)
-        if heading < 0 or length == len(path):
+        advance(kind, level, moves, mark, cost, line, exact, aim, per_bucket, last, pool, queue, touched)
+        if queue[EXPANDED] > limit:
             return ABANDONED, 0
-        path[length] = heading
-        length += 1
-        m = n + DI[heading] * line + DJ[heading]
-        walked += move_cost(kind, level, exact, n, m, heading)
-        n = m
+        if cost[start] == np.inf:
+            return NONE, 0
+        if last != UNTIL_FOUND and heading == COST_ONLY:
+            return FOUND, 0
+        while n != goal:
+            # No path through a neighbour that is as good as the best one costs more than this; the estimate of that
+            # neighbour is at most what was walked and the move to it.
+            last = np.int64(max(walked + cost[n] - aim[3], 0.0) * (1 + MARGIN) * per_bucket) + 1
+            if (queue[NOW] <= last and queue[LIVE] > 0) or heading == COST_ONLY:
+                break
+            heading = pick(kind, level, moves, cost, line, prices, tie, n, heading)
+            if heading < 0 or length == len(path):
+                return ABANDONED, 0
+            path[length] = heading
+            length += 1
+            m = n + DI[heading] * line + DJ[heading]
+            walked += move_cost(kind, level, exact, n, m, heading)
+            n = m
     return FOUND, length
 
 
-@njit(nogil=True)
+@xla_ffi.compiled
 def pick(kind, level, moves, cost, line, prices, tie, n, heading):
     """The direction that `path.pick` takes from cell `n`, in the same float32 numbers; -1 where none leads down."""
     allowed, own = np.int64(moves[n]), np.float32(cost[n])
@@ -164,7 +160,7 @@ def searcher():
     length, answer and expansions, int64 [3]; and `rooms`, as `reader` or the last search left them.
     """
 
-    @njit
+    @xla_ffi.compiled
     def find(arguments, count, results):
         dims = xla_ffi.shape(arguments, 3)
         height, width = np.int64(dims[0]), np.int64(dims[1])
