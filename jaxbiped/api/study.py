@@ -17,8 +17,8 @@ from jaxbiped.core.names import METRICS
 from jaxbiped.errors import InputError
 from jaxbiped.mission.execution import Executor
 from jaxbiped.mission.metric import Metric
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensors import Sensor
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import STRATEGIES, Strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.statistics.schema import FAMILIES

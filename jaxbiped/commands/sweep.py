@@ -45,7 +45,7 @@ def main(args: SweepArgs) -> int:
     for group in groups:
         arenas = min(config.shard, config.arenas)
         queues = max(cores(), jax.local_device_count())
-        check_memory(group.static, len(group.points), len(group.strategies), arenas, queues)
+        check_memory(group.spec, len(group.points), len(group.strategies), arenas, queues)
     for point in points:
         check_mission(point.mission)
     try_rig(config.mission)

@@ -1,4 +1,4 @@
-"""The options of a mission: the config for users. `mission.settings` has its traced form, and loads JAX."""
+"""The options of a mission: the config for users. `mission.params` has its traced form, and loads JAX."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from jaxbiped.sensing.presets import PRESETS, sensor_preset
 
 if TYPE_CHECKING:
     from jaxbiped.mapping.grid import GridSpec
-    from jaxbiped.mission.settings import MissionParams
+    from jaxbiped.mission.params import MissionParams
     from jaxbiped.mission.strategies import Strategy
     from jaxbiped.planning.costs import Costs
 
@@ -187,8 +187,10 @@ class MissionConfig(Model):
         above = max(spec.levels + spec.lowest, min(grounds + HEADROOM, 32))
         return replace(spec, lowest=lowest, levels=above - lowest, ground_levels=grounds)
 
-    def settings(self, strategy: str | Strategy) -> MissionParams:
+    def params(self, strategy: str | Strategy) -> MissionParams:
         """The traced part, for one strategy or the one of a name."""
-        from jaxbiped.mission.settings import settings_of
+        from jaxbiped.mission.params import mission_params
 
-        return settings_of(self, strategy)
+        return mission_params(self, strategy)
+
+    settings = params  # its former name, which scripts may use

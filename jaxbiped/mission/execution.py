@@ -44,7 +44,7 @@ class Executor:
     places_feet: ClassVar[bool] = False  # default for placing feet by measured edges
     on_terrain: ClassVar[bool] = False  # whether it supports arenas with terrain
 
-    def execute(self, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
+    def execute(self, arena: Any, world: Any, command: Any, params: Any) -> Execution:
         """Execute one `Command` in an `Arena`, starting from `WorldState`.
 
         Noise is a function of `world.seed` and `world.decisions` alone (`core` `fold`): the same for every batch.
@@ -71,13 +71,13 @@ WANTED = {"moved": ((3,), "f"), "variances": ((3,), "f"), "time": ((), "f"), "di
 WANTED |= {name: ((), "b") for name in ("collided", "fell", "outside")}
 
 
-def execution_of(executor: Executor, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
+def execution_of(executor: Executor, arena: Any, world: Any, command: Any, params: Any) -> Execution:
     """Run an executor's command and check the result. An invalid distance or time becomes a pose that is not finite.
 
     Raises:
       InputError: a result that is not the execution of one robot.
     """
-    made = executor.execute(arena, world, command, settings)
+    made = executor.execute(arena, world, command, params)
     where = f"executor {type(executor).__name__}"
     if not isinstance(made, Execution):
         raise InputError("its execute must return an Execution", field=where, value=type(made).__name__)

@@ -18,12 +18,12 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.metric import Metric, column_of, find_metric
+from jaxbiped.mission.params import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.primitive_schedule import WalkConfig
 from jaxbiped.mission.sensor_rig import RENDERED
 from jaxbiped.mission.sensors import find_sensor
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy
-from jaxbiped.mission.terrain_check import program_for
+from jaxbiped.mission.terrain_check import checked_spec
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.arena_kinds import ANY, ArenaKind, kinds_of
@@ -46,15 +46,15 @@ class Group:
     """Points and strategies that differ only in traced numbers: `P` points, `S` strategies, one compiled program."""
 
     kind: ArenaKind
-    static: MissionSpec
+    spec: MissionSpec
     walk: WalkConfig | None  # for simulated bipeds
     camera: CameraConfig | None  # for sensors that measure on the host
     points: tuple[int, ...]  # indices of the points, ascending
     strategies: tuple[str, ...]  # their names
-    settings: MissionParams  # [P * S], strategy by strategy within a point
+    params: MissionParams  # [P * S], strategy by strategy within a point
     populations: Population | None  # [U], the distinct ones; None: no population fixes anything
-    population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
-    metrics: tuple[str, ...] = ()  # columns of the metrics of the settings
+    population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `params`
+    metrics: tuple[str, ...] = ()  # columns of their metrics
 
     def rows(self, shard: Shard) -> int:
         """Number of rows in a shard of this group."""
@@ -129,7 +129,7 @@ def group_points(
     metrics: Mapping[str, Metric] | None = None,
     numbers: Mapping[str, float] | None = None,
 ) -> tuple[Group, ...]:
-    """Group points by what sets array shapes and code paths (`mission.program`), in order of first occurrence.
+    """Group points by what sets array shapes and code paths (`mission.mission_spec`), in order of first occurrence.
 
     Strategies whose planners are of different kinds get separate groups.
 
@@ -150,8 +150,8 @@ def group_points(
         simulated = point.mission.executor in SIMULATED
         walk = point.mission.walk if simulated else None
         camera = point.mission.camera if point.mission.sensor in RENDERED else None
-        static = program_for(point.mission, kinds[place].size_xy, kinds[place].terrain)
-        together.setdefault((place, static, walk, camera), []).append(point)
+        spec = checked_spec(point.mission, kinds[place].size_xy, kinds[place].terrain)
+        together.setdefault((place, spec, walk, camera), []).append(point)
     by_planner: dict[tuple, list[Strategy]] = {}
     for item in strategies:
         by_planner.setdefault(kind_of(item.planner), []).append(item)
@@ -193,7 +193,7 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
 
 def group(
     kind: ArenaKind,
-    static: MissionSpec,
+    spec: MissionSpec,
     walk: WalkConfig | None,
     camera: CameraConfig | None,
     points: Sequence[Point],
@@ -201,9 +201,9 @@ def group(
     metrics: Mapping[str, Metric],
 ) -> Group:
     """The group of the points of one program."""
-    settings, measured = [], tuple(traced_component(metric) for metric in metrics.values())
+    params, measured = [], tuple(traced_component(metric) for metric in metrics.values())
     for point in points:
-        first = point.mission.settings(strategies[0])
+        first = point.mission.params(strategies[0])
         for name in ("sensor", "executor"):
             component = with_numbers(getattr(first, name), numbers_under(name, point.own))
             first = replace(first, **{name: traced_component(component)})
@@ -211,17 +211,17 @@ def group(
         for item in strategies:
             own = with_numbers(item.planner, numbers_under("planner", point.own))
             planner = first.planner if own is None else traced_component(own)
-            settings.append(replace(first, strategy=item.flags(cutting), planner=planner, metrics=measured))
+            params.append(replace(first, strategy=item.flags(cutting), planner=planner, metrics=measured))
     different = list(dict.fromkeys(point.population for point in points))
     drawn = different == [PopulationConfig()]
     return Group(
         kind=kind,
-        static=static,
+        spec=spec,
         walk=walk,
         camera=camera,
         points=tuple(point.index for point in points),
         strategies=tuple(item.name for item in strategies),
-        settings=stack(settings),
+        params=stack(params),
         populations=None if drawn else stack([population.traced() for population in different]),
         population_of=np.repeat([different.index(point.population) for point in points], len(strategies)),
         metrics=tuple(metrics),

@@ -17,9 +17,10 @@ from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, ending, no_results
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.sensor_rig import SensorRig, StereoRig
-from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.sensing.config import CameraConfig
 
 
@@ -29,7 +30,7 @@ def run_on_host(
     seeds: UInt32[Array, "A"],
     points: MissionParams,
     count: int,
-    static: MissionSpec,
+    spec: MissionSpec,
     on_progress: OnProgress,
     open_rig: Callable[[], AbstractContextManager[SensorRig]],
     population_of: Int[np.ndarray, "P"],
@@ -46,7 +47,7 @@ def run_on_host(
     """
     size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
     first = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (batch, points))
-    metrics = jax.eval_shape(lambda arena, settings: begun(settings.metrics, arena, settings), *first)
+    metrics = jax.eval_shape(lambda arena, params: begun(params.metrics, arena, params), *first)
     out, left = no_results(kinds, count, metrics=metrics), np.ndindex(count, kinds)
     done, lock, stop = Tally(0, 0), threading.Lock(), threading.Event()
 
@@ -61,11 +62,11 @@ def run_on_host(
                 if job is None:
                     return
                 arena_number, point = job
-                arena, settings = (
+                arena, params = (
                     jax.tree.map(lambda leaf, row=row: leaf[row], tree)
                     for tree, row in ((batch, size * population_of[point] + arena_number), (points, point))
                 )
-                world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, rig))
+                world = jax.device_get(run_bare(MissionSetup(arena, params, spec), seeds[arena_number], rig))
                 last = jax.device_get(ending(world, arena.goal_xy))
                 with lock:
                     for column, value in zip(jax.tree.leaves(out), jax.tree.leaves(last), strict=True):

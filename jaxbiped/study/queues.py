@@ -16,7 +16,8 @@ from jaxbiped.core.sizes import ARENAS, JOBS, POINTS, fill_up, filled
 from jaxbiped.devices import cores, mesh_of
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
-from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.params import MissionParams, MissionSpec
+from jaxbiped.mission.setup import MissionSetup
 
 
 @with_own_settings
@@ -25,7 +26,7 @@ def run_all(
     seeds: UInt32[Array, "A"],
     points: MissionParams,
     count: int,
-    static: MissionSpec,
+    spec: MissionSpec,
     on_progress: OnProgress,
     workers: int | None = None,
     slots: int = SLOTS,
@@ -54,7 +55,7 @@ def run_all(
     devices = devices or jax.local_devices()
     queues = len(devices) if len(devices) > 1 else max(1, min(workers or cores(), -(-count * kinds // slots)))
     length = filled(-(-size * kinds // queues), JOBS)
-    batch, points = fill_up(batch, ARENAS), fill_up(points, POINTS)
+    setup = MissionSetup(fill_up(batch, ARENAS), fill_up(points, POINTS), spec)
     hands = []
     for number in range(queues):
         mine = np.arange(number, size * kinds, queues)
@@ -65,12 +66,10 @@ def run_all(
         hands.append(jobs)
     if len(devices) > 1:
         jobs, mesh = stack(hands), mesh_of(devices)
-        result = jax.device_get(
-            compile_queue(batch, points, jobs, static, slots, mesh)(batch, points, jobs, on_progress)
-        )
+        result = jax.device_get(compile_queue(setup, jobs, slots, mesh)(setup, jobs, on_progress))
         results = [jax.tree.map(lambda leaf, number=number: leaf[number], result) for number in range(queues)]
     else:
-        results = run_threads(compile_queue(batch, points, hands[0], static, slots), batch, points, hands, on_progress)
+        results = run_threads(compile_queue(setup, hands[0], slots), setup, hands, on_progress)
     out = jax.tree.map(lambda leaf: np.zeros((kinds, count, *leaf.shape[1:]), leaf.dtype), results[0])
     for number, result in enumerate(results):
         mine = np.arange(number, count * kinds, queues)
@@ -79,9 +78,7 @@ def run_all(
     return out
 
 
-def run_threads(
-    work: Work, batch: Arena, points: MissionParams, hands: Sequence[Jobs], on_progress: OnProgress
-) -> list[Result]:
+def run_threads(work: Work, setup: MissionSetup, hands: Sequence[Jobs], on_progress: OnProgress) -> list[Result]:
     """Run queues at once, one thread each."""
     tallies, lock = [Tally(0, 0)] * len(hands), threading.Lock()
     stop = threading.Event()
@@ -94,7 +91,7 @@ def run_threads(
                 tallies[number] = tally
                 on_progress(sum(tallies, Tally(0, 0)))
 
-        return jax.device_get(work(batch, points, hands[number], tell))
+        return jax.device_get(work(setup, hands[number], tell))
 
     with ThreadPoolExecutor(len(hands)) as pool:
         try:

@@ -21,8 +21,8 @@ from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.config import EXECUTORS, SENSORS
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.recorded_driver import Mission
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.statistics.comparison import paired
 from jaxbiped.statistics.schema import KNOWN

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import CostConfig, MissionConfig
+from jaxbiped.mission.params import CostConfig, MissionConfig
 from jaxbiped.statistics.intervals import Estimate, mean_and_median
 from jaxbiped.statistics.paired import PairedMetric, metric_difference, success_difference
 from jaxbiped.study.durations import fit

@@ -10,9 +10,10 @@ from jaxtyping import Array, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result
+from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.mission.primitive_schedule import WalkConfig
 from jaxbiped.mission.sensor_rig import SensorRig
-from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.simulated_driver import walk
 
 
@@ -22,7 +23,7 @@ def walk_all(
     seeds: UInt32[Array, "A"],
     points: MissionParams,
     count: int,
-    static: MissionSpec,
+    spec: MissionSpec,
     on_progress: OnProgress,
     config: WalkConfig,
     population_of: Int[np.ndarray, "P"],
@@ -33,5 +34,5 @@ def walk_all(
     point, arena = (grid.ravel() for grid in np.meshgrid(np.arange(kinds), np.arange(count), indexing="ij"))
     place = arena + seeds.shape[0] * population_of[point]
     jobs = Jobs(jnp.asarray(place), jnp.asarray(point), seeds[arena], jnp.int32(len(arena)))
-    result = walk(batch, points, jobs, static, config, on_progress, rig=rig)
+    result = walk(MissionSetup(batch, points, spec), jobs, config, on_progress, rig=rig)
     return jax.tree.map(lambda leaf: leaf.reshape(kinds, count, *leaf.shape[1:]), result)

@@ -28,8 +28,8 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.mission.batched_driver import Result, stack
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import SIMULATED, MissionConfig, mission_spec
 from jaxbiped.mission.sensor_rig import RENDERED
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.paired import success_difference
@@ -44,9 +44,9 @@ WAYS = ("landmarks", "odometry", "visual", "icp", "both")
 
 def play(config: MissionConfig, batch, seeds, count: int, strategy: str) -> Result:
     """Missions of one kind on a batch of arenas: leaves [count]."""
-    static = program(config, (SIZE_X, SIZE_Y))
-    points, one = stack([config.settings(strategy)]), np.zeros(1, int)
-    arguments = batch, seeds, points, count, static, lambda _: None
+    spec = mission_spec(config, (SIZE_X, SIZE_Y))
+    points, one = stack([config.params(strategy)]), np.zeros(1, int)
+    arguments = batch, seeds, points, count, spec, lambda _: None
     see = partial(open_rig, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
         with see() if see else contextlib.nullcontext() as rig:

@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.sensing.camera import mount, placed
 from jaxbiped.sensing.config import VisualConfig
 from jaxbiped.sensing.counter_rng import fold

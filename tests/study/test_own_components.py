@@ -184,7 +184,7 @@ def test_numbers_of_components_are_those_of_missions_played_again():
         fear: float = 3.0
 
     strategy = Strategy("shy", Shy())
-    settings = jb.MissionConfig().settings(strategy)
-    assert float(numbered(settings, strategy, {"planner.fear": 5.0}).planner.fear) == 5.0
-    same = numbered(settings, strategy, {"sensor.reach": 1.0})
-    assert float(same.planner.fear) == 3.0 and same.sensor == settings.sensor
+    params = jb.MissionConfig().params(strategy)
+    assert float(numbered(params, strategy, {"planner.fear": 5.0}).planner.fear) == 5.0
+    same = numbered(params, strategy, {"sensor.reach": 1.0})
+    assert float(same.planner.fear) == 3.0 and same.sensor == params.sensor

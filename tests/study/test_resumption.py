@@ -15,7 +15,7 @@ import pytest
 from jaxbiped import files
 from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.errors import InputError
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.study import shard_files, store
 from jaxbiped.study.lock import FolderLock
 from jaxbiped.study.resumption import refuse_taken

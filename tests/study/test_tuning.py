@@ -9,7 +9,7 @@ import pytest
 
 from jaxbiped.mission.batched_driver import Result, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.state import Planned
 from jaxbiped.study.search import sobol
 from jaxbiped.study.trials import objective

@@ -84,7 +84,7 @@ class MissionParams:
 class MissionSpec:
     """What determines array shapes and code paths: one mission program is compiled for each of these. Hashable."""
 
-    spec: GridSpec
+    grid: GridSpec
     image: ImageSpec
     sensor: str
     executor: str
@@ -93,8 +93,15 @@ class MissionSpec:
     fading: bool = False  # whether the map forgets what has moved
     knows_pose: bool = False  # whether the robot does, and its points have no attitude error to remove
 
+    @property
+    def spec(self) -> GridSpec:
+        """`grid` by its former name, which sensors may read."""
+        return self.grid
 
-def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> MissionSpec:
+
+def mission_spec(
+    config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None
+) -> MissionSpec:
     """The static part of a config for arenas of one size [m] with such terrain, whose heights are concrete.
 
     Raises:
@@ -124,7 +131,7 @@ def program(config: MissionConfig, size_xy: tuple[float, float], terrain: Height
 PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # for strategies without their own
 
 
-def settings_of(config: MissionConfig, strategy: str | Strategy) -> MissionParams:
+def mission_params(config: MissionConfig, strategy: str | Strategy) -> MissionParams:
     """The traced form of a config, for one strategy, given as object or by name."""
     limits = config.limits
     sd, sd_yaw = limits.start_sd
