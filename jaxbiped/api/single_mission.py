@@ -102,5 +102,5 @@ def play(
     chosen = find_strategy(strategy) if isinstance(strategy, str) else named(strategy)
     check_mission(config)
     with seeing(config) as rig:
-        played = play_one(arena, config, chosen, noise_of(seed), on_decision, rig)
+        played = play_one(arena, config, config.params(chosen), noise_of(seed), on_decision, rig)
     return PlayedMission(name, chosen.name, played)

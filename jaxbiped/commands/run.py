@@ -50,7 +50,7 @@ def main(args: RunArgs) -> int:
         mission = play_one(
             arena,
             args.mission,
-            strategy,
+            args.mission.params(strategy),
             noise_of(args.seed),
             lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
             rig,

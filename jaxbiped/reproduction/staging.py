@@ -34,7 +34,7 @@ def load_scenes(folder: Path, names: tuple[str, ...]) -> dict[str, Arena]:
 
 def play(arena: Arena, config: MissionConfig, strategy: str, seed: int, rig: SensorRig | None = None) -> Mission:
     """One mission, with its log. Consumes `jax.random.key(seed)`."""
-    return play_one(arena, config, strategy, noise_of(seed), rig=rig)
+    return play_one(arena, config, config.params(strategy), noise_of(seed), rig=rig)
 
 
 def play_changing(

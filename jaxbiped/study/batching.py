@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Int
@@ -39,6 +40,15 @@ class Point:
     population: PopulationConfig
     values: dict[str, float] = field(default_factory=dict)  # values of dotted fields of the config
     own: dict[str, float] = field(default_factory=dict)  # those of components, such as `planner.clearance`
+
+
+class Common(NamedTuple):
+    """What the points of a group have in common."""
+
+    kind: ArenaKind
+    spec: MissionSpec
+    walk: WalkConfig | None  # for simulated bipeds
+    camera: CameraConfig | None  # for sensors that measure on the host
 
 
 @dataclass(frozen=True)
@@ -156,7 +166,7 @@ def group_points(
     for item in strategies:
         by_planner.setdefault(kind_of(item.planner), []).append(item)
     return tuple(
-        group(kinds[place], *key, members, same, metrics or {})
+        group(Common(kinds[place], *key), members, same, metrics or {})
         for (place, *key), members in together.items()
         for same in by_planner.values()
     )
@@ -192,10 +202,7 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
 
 
 def group(
-    kind: ArenaKind,
-    spec: MissionSpec,
-    walk: WalkConfig | None,
-    camera: CameraConfig | None,
+    common: Common,
     points: Sequence[Point],
     strategies: Sequence[Strategy],
     metrics: Mapping[str, Metric],
@@ -215,10 +222,7 @@ def group(
     different = list(dict.fromkeys(point.population for point in points))
     drawn = different == [PopulationConfig()]
     return Group(
-        kind=kind,
-        spec=spec,
-        walk=walk,
-        camera=camera,
+        **common._asdict(),
         points=tuple(point.index for point in points),
         strategies=tuple(item.name for item in strategies),
         params=stack(params),

@@ -28,6 +28,7 @@ from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.metric_values import check_metrics, metric_columns
 from jaxbiped.study.rows import frame
 from jaxbiped.study.runner import batch_driver
+from jaxbiped.study.workload import Workload
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 
@@ -94,8 +95,9 @@ def compute(
     turns = None if len(kind.places) == kind.number else jnp.asarray(kind.turns(index))
     batch, seeds = draw(key, jnp.asarray(index), kind.families, group.populations, turns)
     check_metrics(batch, group, size)
+    workload = Workload(batch, seeds, group.params, count, group.spec, group.population_of)
     with batch_driver(group, workers or cores()) as play:
-        result = play(batch, seeds, group.params, count, group.spec, on_progress, population_of=group.population_of)
+        result = play(workload, on_progress)
     batch = jax.device_get(batch)  # slicing arrays on a device would be compiled, slice by slice
     plan = plan_all(batch, group, size)
     families = [kind.families[turn] for turn in kind.turns(index[:count])]

@@ -9,60 +9,50 @@ from concurrent.futures import ThreadPoolExecutor
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Int, UInt32
 
-from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.sizes import ARENAS, JOBS, POINTS, fill_up, filled
 from jaxbiped.devices import cores, mesh_of
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import SLOTS, Jobs, OnProgress, Result, Tally, Work, compile_queue, stack
-from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.study.workload import Workload
 
 
 @with_own_settings
 def run_all(
-    batch: Arena,
-    seeds: UInt32[Array, "A"],
-    points: MissionParams,
-    count: int,
-    spec: MissionSpec,
+    workload: Workload,
     on_progress: OnProgress,
     workers: int | None = None,
     slots: int = SLOTS,
-    population_of: Int[np.ndarray, "P"] | None = None,
     devices: Sequence[jax.Device] | None = None,
 ) -> Result:
-    """The first `count` arenas under every point: results [P, count], on the host.
+    """Play a workload: results [P, count], on the host.
 
     Jobs are dealt to as many queues as there are devices or, with one device, to as many as there are workers. The
     queue that a job is in does not change its result.
 
     Args:
-      batch: [A], or [U * A] where there are `U` populations.
       workers: the most queues, by default as many as cores that this process may use; fewer if each would have more
         slots than jobs.
       slots: slots of each queue. XLA fuses a program depending on its sizes, and fusion affects rounding: rows are the
         same, bit for bit, only among runs with as many slots, so few jobs get as many slots as many jobs.
-      population_of: the population of each point; by default the first.
       devices: by default all of this process.
     """
-    size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
-    block = size * (np.zeros(kinds, int) if population_of is None else population_of)
+    size, kinds, count, block = workload.size, workload.kinds, workload.count, workload.blocks
     arena, point = (grid.ravel() for grid in np.meshgrid(np.arange(size), np.arange(kinds)))
     real = arena < count
     arena, point = np.concatenate([arena[real], arena[~real]]), np.concatenate([point[real], point[~real]])
     devices = devices or jax.local_devices()
     queues = len(devices) if len(devices) > 1 else max(1, min(workers or cores(), -(-count * kinds // slots)))
     length = filled(-(-size * kinds // queues), JOBS)
-    setup = MissionSetup(fill_up(batch, ARENAS), fill_up(points, POINTS), spec)
+    setup = MissionSetup(fill_up(workload.arenas, ARENAS), fill_up(workload.params, POINTS), workload.spec)
     hands = []
     for number in range(queues):
         mine = np.arange(number, size * kinds, queues)
         mine = np.concatenate([mine, np.zeros(length - len(mine), int)])
         active = len(range(number, count * kinds, queues))
         place = jnp.asarray(arena[mine] + block[point[mine]])
-        jobs = Jobs(place, jnp.asarray(point[mine]), seeds[arena[mine]], jnp.int32(active))
+        jobs = Jobs(place, jnp.asarray(point[mine]), workload.seeds[arena[mine]], jnp.int32(active))
         hands.append(jobs)
     if len(devices) > 1:
         jobs, mesh = stack(hands), mesh_of(devices)

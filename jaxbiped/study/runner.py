@@ -67,23 +67,21 @@ def seeing(config: MissionConfig) -> Iterator[SensorRig | None]:
 def play_one(
     arena: Arena,
     config: MissionConfig,
-    strategy: str | Strategy,
+    params: MissionParams,
     noise: UInt32[Array, ""],
     on_decision: Callable[[Played], None] = lambda _: None,
     rig: SensorRig | None = None,
-    numbers: Mapping[str, float] | None = None,
 ) -> Mission:
     """Play one mission as a study would, with a log of everything.
 
     Args:
+      params: those of the config for one strategy (`MissionConfig.params`, `numbered`).
       noise: seed of all its noise.
       rig: from `seeing`, if the sensor measures on the host.
-      numbers: numbers of components, instead of their defaults, such as `{"planner.clearance": 0.1}`.
 
     Raises:
       InputError: a pitch that does not divide the arena, a biped that cannot be simulated.
     """
-    params = numbered(config.params(strategy), strategy, numbers or {})
     setup = MissionSetup(arena, params, spec_of(config, arena))
     if config.executor in SIMULATED:
         from jaxbiped.mission.simulated_driver import walk_logged  # loads MuJoCo
@@ -93,7 +91,7 @@ def play_one(
 
 
 def numbered(params: MissionParams, strategy: str | Strategy, numbers: Mapping[str, float]) -> MissionParams:
-    """Parameters of a strategy with other numbers for its components."""
+    """Parameters of a strategy with other numbers for its components, such as `{"planner.clearance": 0.1}`."""
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
     changed = {"sensor": params.sensor, "executor": params.executor, "planner": strategy.planner}
     for name, component in changed.items():
@@ -106,7 +104,7 @@ def numbered(params: MissionParams, strategy: str | Strategy, numbers: Mapping[s
 
 @contextlib.contextmanager
 def batch_driver(group: Group, workers: int) -> Iterator[Callable[..., Result]]:
-    """What plays the missions of a group: a function with the arguments of `queues.run_all`."""
+    """What plays the missions of a group: a function with the first two arguments of `queues.run_all`."""
     from jaxbiped.study.hosted import open_rig, run_on_host
     from jaxbiped.study.queues import run_all
 

@@ -47,6 +47,7 @@ from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluation import draw, evaluate
 from jaxbiped.study.queues import run_all
+from jaxbiped.study.workload import Workload
 from tests.reference import mission as reference
 
 CONFIG = MissionConfig()
@@ -68,8 +69,8 @@ def compiled_side(arenas: int):
     """A function that works off the list of missions, several times over: results [P, arenas * copies]."""
     copies = -(-MISSIONS // (arenas * len(STRATEGIES)))
     batch, seeds = draw(jax.random.key(0), jnp.tile(jnp.arange(arenas), copies), FAMILIES)
-    params = points()
-    return lambda: run_all(batch, seeds, params, len(seeds), SPEC, lambda ended: None)
+    workload = Workload(batch, seeds, points(), len(seeds), SPEC)
+    return lambda: run_all(workload, lambda ended: None)
 
 
 def play_one(arena, setting, seed):
@@ -226,7 +227,7 @@ def sweep(vectors: int = 64, arenas: int = 8) -> None:
     for k in range(vectors + 1):
         costs = planning.Costs(*(jnp.float32(c) for c in rng.uniform(0.1, 30, 5)))
         point = stack([replace(setting, costs=costs)])
-        result = run_all(batch, seeds, point, arenas, SPEC, lambda ended: None)
+        result = run_all(Workload(batch, seeds, point, arenas, SPEC), lambda ended: None)
         seen.add(float(result.time.sum()))
         if k == 0:
             warm = counted()

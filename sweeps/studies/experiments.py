@@ -30,6 +30,7 @@ from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.study.hosted import open_rig, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
+from jaxbiped.study.workload import Workload
 
 SCENES = Path(__file__).parents[2] / "configs" / "scenes"
 
@@ -40,17 +41,15 @@ def play(item: Experiment, config: MissionConfig, seeds: int):
     spec = mission_spec(config, tuple(round(float(v), 6) for v in arena.size_xy))
     batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (seeds, *jnp.shape(leaf))), arena)
     noise = jnp.stack([from_key(jax.random.key(seed)) for seed in range(seeds)])
-    points = stack([config.params(item.strategy)])
-    arguments = batch, noise, points, seeds, spec, lambda _: None
-    one = np.zeros(1, int)
+    workload = Workload(batch, noise, stack([config.params(item.strategy)]), seeds, spec)
     see = partial(open_rig, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
         with see() if see else contextlib.nullcontext() as rig:
-            result = walk_all(*arguments, config.walk, population_of=one, rig=rig)
+            result = walk_all(workload, lambda _: None, config.walk, rig)
     elif see:
-        result = run_on_host(*arguments, see, population_of=one)
+        result = run_on_host(workload, lambda _: None, see)
     else:
-        result = run_all(*arguments, workers=1, slots=seeds)
+        result = run_all(workload, lambda _: None, workers=1, slots=seeds)
     return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
 
 

@@ -10,6 +10,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_logged
 from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.study.queues import run_all
+from jaxbiped.study.workload import Workload
 from tests.mission.conftest import SPEC, pad, play, row
 
 # A program for another number of slots may sum in another order: a hundred roundings of a float32.
@@ -51,7 +52,8 @@ def test_slots_workers_and_batch_do_not_matter(population, played):
     points = list({id(setting): setting for setting in params}.values())
     ended = []
     batch = jax.tree.map(jnp.asarray, pad(arenas, len(arenas)))
-    everything = run_all(batch, jnp.asarray(seeds), stack(points), len(arenas), SPEC, ended.append, workers=3, slots=5)
+    workload = Workload(batch, jnp.asarray(seeds), stack(points), len(arenas), SPEC)
+    everything = run_all(workload, ended.append, workers=3, slots=5)
     for k, setting in enumerate(params):
         point = next(p for p, q in enumerate(points) if q is setting)
         assert_same(row(everything, (point, k)), row(played, k), OTHER_PROGRAM)

@@ -21,6 +21,7 @@ from jaxbiped.mission.state import start
 from jaxbiped.sensing import Motion, Sightings, View
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.study.queues import run_all
+from jaxbiped.study.workload import Workload
 
 AREA = (1.8, 1.4)
 MOVED, VARIANCES = jnp.array([0.05, 0.0, 0.0]), jnp.array([1e-6, 1e-6, 1e-4])
@@ -147,7 +148,7 @@ def test_missions_go_by_each_way(arena, way, middle):
     params, spec = kind(way)
     batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (SEEDS, *jnp.shape(leaf))), arena)
     noise = jnp.stack([from_key(jax.random.key(seed)) for seed in range(SEEDS)])
-    found = run_all(batch, noise, stack([params]), SEEDS, spec, lambda _: None, workers=1, slots=SEEDS)
+    found = run_all(Workload(batch, noise, stack([params]), SEEDS, spec), lambda _: None, workers=1, slots=SEEDS)
     assert np.all(np.asarray(found.code) == Code.REACHED)
     assert np.median(found.pose_error) < middle
     if way in ("visual", "both"):  # nothing bounds the drift of the others

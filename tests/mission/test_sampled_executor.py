@@ -22,6 +22,7 @@ from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing.config import OdometryConfig
 from jaxbiped.study.queues import run_all
+from jaxbiped.study.workload import Workload
 from tests.mission.test_failures import scene
 
 CONFIG = MissionConfig(executor="sampled")
@@ -219,5 +220,6 @@ def test_scenes_with_bumps_are_solved_whatever_the_seed(number):
     _, arena = load_scene(f"configs/scenes/experiment_{number}.toml")
     spec = mission_spec(CONFIG, tuple(round(float(v), 6) for v in arena.size_xy))
     arenas, params = stack([jax.device_get(arena)] * 256), stack([PARAMS])
-    ended = run_all(*jax.tree.map(jnp.asarray, (arenas, seeds(256), params)), 256, spec, lambda _: None, slots=64)
+    arenas, params = jax.tree.map(jnp.asarray, (arenas, params))
+    ended = run_all(Workload(arenas, seeds(256), params, 256, spec), lambda _: None, slots=64)
     assert np.sum(np.asarray(ended.code) != Code.REACHED) <= 4  # at most 0 were seen; chance, at 2 of 768, gives 0.7

@@ -20,6 +20,7 @@ from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.sensing import camera as cameras
 from jaxbiped.study.hosted import run_on_host
+from jaxbiped.study.workload import Workload
 from tests.mission.conftest import CONFIG, SPEC
 
 by_ray_cast = jax.jit(jax.vmap(partial(sense, body_pose=None)))
@@ -42,9 +43,7 @@ def test_missions_that_are_given_what_they_see(population, played):
     points = stack(population[1][:1])
     ended = []
     opened = lambda: nullcontext(Mirror())  # noqa: E731
-    result = run_on_host(
-        batch, jnp.asarray(seeds), points, 2, SPEC, ended.append, opened, population_of=np.zeros(1, int)
-    )
+    result = run_on_host(Workload(batch, jnp.asarray(seeds), points, 2, SPEC), ended.append, opened)
     for k in np.flatnonzero([setting is population[1][0] for setting in population[1][:2]]):
         for name in ("code", "measurements", "decisions"):
             assert getattr(result, name)[0, k] == getattr(played, name)[k], name
@@ -63,9 +62,7 @@ def test_eyes_that_cannot_be_opened_end_all_missions(first_look):
 
     batch = jax.tree.map(lambda leaf: jnp.repeat(leaf, 9, axis=0), setup.arena)
     with pytest.raises(InputError, match="nothing can be rendered"):
-        run_on_host(
-            batch, jnp.zeros(9, jnp.uint32), setup.params, 9, SPEC, print, broken, population_of=np.zeros(1, int)
-        )
+        run_on_host(Workload(batch, jnp.zeros(9, jnp.uint32), setup.params, 9, SPEC), print, broken)
     assert 1 <= len(tried) <= 2
 
 
