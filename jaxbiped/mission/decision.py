@@ -28,7 +28,7 @@ from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
 from jaxbiped.planning.planners import FINE, TOO_SLOW, Problem, Route
-from jaxbiped.sensing.camera import mount
+from jaxbiped.sensing.camera import MountedCamera, mount
 from jaxbiped.sensing.view import Sightings, View
 
 LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is known
@@ -159,7 +159,7 @@ def read_map(agent: AgentState, view: View, params: MissionParams, spec: Mission
 def eye_of(agent: AgentState, params: MissionParams, spec: MissionSpec) -> Eye:
     """How a robot measures, and how much it keeps of older evidence that contradicts its new view."""
     at = mount(params.camera, agent.look, agent.squat)
-    return Eye(params.camera, at, spec.image, keep=jnp.exp(-agent.since / params.mapping.fade))
+    return Eye(MountedCamera(params.camera, at, spec.image), keep=jnp.exp(-agent.since / params.mapping.fade))
 
 
 def choose(
