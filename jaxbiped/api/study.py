@@ -15,7 +15,7 @@ from jaxbiped.arenas.source import Family
 from jaxbiped.config import input_error
 from jaxbiped.core.names import METRICS
 from jaxbiped.errors import InputError
-from jaxbiped.mission.execution import Executor
+from jaxbiped.executors.execution import Executor
 from jaxbiped.mission.metric import Metric
 from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensors import Sensor

@@ -17,8 +17,8 @@ from jaxbiped.commands.options.tune import TuneArgs
 from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
+from jaxbiped.executors.motion_library import load_library
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.mission.library import load_library
 from jaxbiped.mission.params import mission_spec
 from jaxbiped.motion.config import DurationConfig
 from jaxbiped.report.tables import to_markdown, to_rich

@@ -21,11 +21,12 @@ from jaxtyping import Array, Float, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready
 from jaxbiped.devices import ALL, EACH, on_each, placed
+from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.mission_step import step
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import AgentState, Planned, WorldState, start
+from jaxbiped.mission.state import AgentState, start
 
 SLOTS = 64  # missions at once: the maps of this many arenas fit in the cache of one core
 TURNS = 32  # decisions between two checks of the queue by the host

@@ -12,6 +12,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import mapping, planning
+from jaxbiped.executors.world_state import Planned
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
@@ -23,7 +24,7 @@ from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.mission.route import pose_problem
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import AgentState, Planned
+from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride

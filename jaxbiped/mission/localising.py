@@ -11,13 +11,14 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, UInt32
 
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation.kalman_filter import Belief, correct, predict_seen
 from jaxbiped.localisation.scan_match import add_walls, find_walls, match, picture_shape
 from jaxbiped.mapping import level_view
 from jaxbiped.mission.params import ICP, VISUAL, MissionParams, MissionSpec
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import AgentState, Anchor, WorldState
+from jaxbiped.mission.state import AgentState, Anchor
 from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.motion import track
 from jaxbiped.sensing.view import Sightings, View

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from jaxbiped.core.registry import METRICS
+from jaxbiped.executors.execution import CHECKS, TOUCH
 from jaxbiped.geometry.boxes import plan_distance
-from jaxbiped.mission.execution import CHECKS, TOUCH
 from jaxbiped.mission.metric import Metric, MissionEnd, Step
 from jaxbiped.mission.outcome import Code
 

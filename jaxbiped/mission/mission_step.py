@@ -11,19 +11,20 @@ from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.moving_boxes import at_time, only
+from jaxbiped.executors.execution import Execution, execution_of
+from jaxbiped.executors.moving_collisions import met
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.localisation.kalman_filter import predict
 from jaxbiped.mission.decision import DecisionTrace, climbed, decide
-from jaxbiped.mission.execution import Execution, execution_of
 from jaxbiped.mission.foot_placement import walked
 from jaxbiped.mission.localising import carried_on, unmarked
 from jaxbiped.mission.metric import Step, updated
-from jaxbiped.mission.moving_collisions import met
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionParams
 from jaxbiped.mission.sensors import Oracle, RayCast, Standpoint, view_of
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import landmarks
 from jaxbiped.sensing.counter_rng import fold

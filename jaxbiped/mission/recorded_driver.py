@@ -12,6 +12,7 @@ from jaxtyping import Array, Float, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.log import MissionLog, Picture
@@ -21,7 +22,7 @@ from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.snapshots import agent_pose, ground, marks, moment, nothing, outlines, pose_of, walk_of
-from jaxbiped.mission.state import AgentState, WorldState, start
+from jaxbiped.mission.state import AgentState, start
 from jaxbiped.motion.primitives import Command, Primitive
 
 NAMES = {

@@ -10,12 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.config import RENDERED as RENDERED
 from jaxbiped.mission.mission_step import SENSE
 from jaxbiped.mission.params import VISUAL, MissionConfig, MissionParams
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.mission.state import AgentState
 from jaxbiped.sensing.camera import Mount, mount, placed
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.counter_rng import fold

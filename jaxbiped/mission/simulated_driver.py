@@ -23,6 +23,9 @@ from jaxbiped.arenas.ground import refuse_terrain
 from jaxbiped.biped.gait import TIMESTEP
 from jaxbiped.biped.model import robot_spec
 from jaxbiped.errors import InputError
+from jaxbiped.executors.config import WalkConfig
+from jaxbiped.executors.primitive_schedule import FURTHEST_CLIMB, Move, requests, targets
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridSpec
@@ -30,7 +33,6 @@ from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, ending, no
 from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import SIMULATED, MissionConfig
-from jaxbiped.mission.primitive_schedule import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
 from jaxbiped.mission.recorded_driver import Mission, Played, Recorder
 from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.setup import MissionSetup
@@ -47,7 +49,7 @@ from jaxbiped.mission.simulated_step import (
     scatter,
 )
 from jaxbiped.mission.stage import Stage
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState, start
+from jaxbiped.mission.state import AgentState, start
 from jaxbiped.motion.grid_units import CELL
 from jaxbiped.motion.primitives import Command, Primitive
 

@@ -8,15 +8,16 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
+from jaxbiped.executors.execution import ODOMETRY, Execution
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.batched_driver import Jobs, begin, pick
 from jaxbiped.mission.decision import DecisionTrace
-from jaxbiped.mission.executors import ODOMETRY, Execution
 from jaxbiped.mission.mission_step import apply_outcome, sense_and_decide
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.sensing.counter_rng import fold

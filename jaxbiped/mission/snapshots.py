@@ -10,13 +10,13 @@ from jaxtyping import Array, Bool, Float
 from jaxbiped import planning
 from jaxbiped.arenas.arena import CIRCLE, Arena
 from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import to_world
 from jaxbiped.mapping import level_view
 from jaxbiped.mapping.cobstacles import occupied_levels
 from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.log import Ground, Mark, Outline, Walk
 from jaxbiped.mission.params import MissionParams, MissionSpec
-from jaxbiped.mission.state import WorldState
 
 
 def moment(world: WorldState, thought: DecisionTrace, params: MissionParams, spec: MissionSpec, action: str) -> dict:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from jaxbiped.arenas.ground import WITH_TERRAIN, no_terrain_for
+from jaxbiped.executors.execution import find_executor
 from jaxbiped.geometry.height_field import HeightField
-from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.params import MissionConfig, MissionSpec, mission_spec
 from jaxbiped.mission.sensors import find_sensor
 

@@ -16,11 +16,11 @@ from jaxbiped.arenas.source import OwnFamily, find_family, name_of
 from jaxbiped.core.component import kind_of, numbers_of, traced_component, with_numbers
 from jaxbiped.core.names import MOVING
 from jaxbiped.errors import InputError
+from jaxbiped.executors.config import WalkConfig
+from jaxbiped.executors.execution import find_executor
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.metric import Metric, column_of, find_metric
 from jaxbiped.mission.params import SIMULATED, MissionConfig, MissionParams, MissionSpec
-from jaxbiped.mission.primitive_schedule import WalkConfig
 from jaxbiped.mission.sensor_rig import RENDERED
 from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, find_strategy

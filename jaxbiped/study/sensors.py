@@ -14,6 +14,7 @@ from jaxtyping import Array, Bool, Float, Int8, UInt32
 from jaxbiped import mapping
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
@@ -24,7 +25,7 @@ from jaxbiped.mission.params import MissionConfig, MissionParams, MissionSpec, m
 from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import AgentState, WorldState, start
+from jaxbiped.mission.state import AgentState, start
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.view import View
 from jaxbiped.study.evaluation import draw

@@ -6,9 +6,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxbiped.executors.config import WalkConfig
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result
-from jaxbiped.mission.primitive_schedule import WalkConfig
 from jaxbiped.mission.sensor_rig import SensorRig
 from jaxbiped.mission.simulated_driver import walk
 from jaxbiped.study.workload import Workload

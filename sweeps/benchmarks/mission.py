@@ -34,9 +34,9 @@ from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.core.names import STRATEGIES
 from jaxbiped.devices import cores
+from jaxbiped.executors.kinematic_executor import kinematic
 from jaxbiped.mission import decision
 from jaxbiped.mission.batched_driver import SLOTS, stack
-from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.mission_step import apply_outcome, sense, step
 from jaxbiped.mission.params import MissionConfig, mission_spec

@@ -11,12 +11,12 @@ import pytest
 from jaxbiped.arenas import load_scene, scene_warnings
 from jaxbiped.arenas.ground import HOLE, cast_ground, ground_height, rises_near, terrain_height
 from jaxbiped.errors import InputError
+from jaxbiped.executors.kinematic_executor import kinematic
+from jaxbiped.executors.sampled_executor import sampled
 from jaxbiped.geometry.height_field import HeightField
 from jaxbiped.geometry.rays import cast_boxes, key, nearness
 from jaxbiped.mapping import Cell, GridSpec, truth_grid
-from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.params import MissionConfig, mission_spec
-from jaxbiped.mission.sampled_executor import sampled
 from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.motion.config import RobotConfig

@@ -13,12 +13,12 @@ from itertools import product
 
 import numpy as np
 
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.mapping.gridmap import GridMap
 from jaxbiped.mapping.relief import FACE, Surfaces
 from jaxbiped.mission.mission_step import SENSE
-from jaxbiped.mission.state import WorldState
 from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.view import View
 from tests.reference import mapping, sensing

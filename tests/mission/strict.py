@@ -12,10 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.core.registry import EXECUTORS
+from jaxbiped.executors.execution import Executor
+from jaxbiped.executors.kinematic_executor import kinematic
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose, to_world
-from jaxbiped.mission.execution import Executor
-from jaxbiped.mission.executors import kinematic
 from jaxbiped.motion.primitives import Primitive
 
 FINE = np.arange(-0.06, 0.2401, 0.001, dtype=np.float32)  # [m] ahead of the robot, where edges are looked for

@@ -10,8 +10,8 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.core.component import check_component
 from jaxbiped.core.registry import EXECUTORS, METRICS, SENSORS
+from jaxbiped.executors.execution import Execution, execution_of, find_executor
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.execution import Execution, execution_of, find_executor
 from jaxbiped.mission.host_sensor import HostSensor
 from jaxbiped.mission.metric import MissionEnd, Step, as_metric, column_of, find_metric, numbers_at_end, updated
 from jaxbiped.mission.params import mission_spec

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.scene import SceneConfig, to_arena
+from jaxbiped.executors.kinematic_executor import kinematic
+from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.mission_step import apply_outcome
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.setup import MissionSetup
-from jaxbiped.mission.state import Planned, WorldState, start
+from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing.counter_rng import fold
 from tests.mission.conftest import CONFIG, SPEC, play, row

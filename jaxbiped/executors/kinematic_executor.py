@@ -1,33 +1,24 @@
-"""Executors play a command in the true world; also the referee's rules for a nominal one.
-
-`kinematic` moves exactly as the primitives say; `sampled` moves as simulated bipeds were measured to; simulated bipeds
-are driven from the host. Users may add more (`execution.Executor`).
-"""
+"""The executor that moves exactly as the primitives say, and the referee's rules for it: `kinematic`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import jax
 import jax.numpy as jnp
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height, rises_near
-from jaxbiped.core.registry import EXECUTORS
+from jaxbiped.executors.execution import CHECKS, ODOMETRY, TOUCH, Execution
+from jaxbiped.executors.params import ExecutorParams
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.execution import CHECKS, ODOMETRY, TOUCH, Execution, Executor
-from jaxbiped.mission.params import MissionParams
-from jaxbiped.mission.sampled_executor import sampled
-from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command, duration
 from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 
 
 @with_own_settings
-def kinematic(arena: Arena, world: WorldState, command: Command, params: MissionParams) -> Execution:
+def kinematic(arena: Arena, world: WorldState, command: Command, params: ExecutorParams) -> Execution:
     """Nominal displacement and time (Table 2); odometry drifts with the distance walked.
 
     Referee, from the true arena: the robot collides if a box between its foot, raised by a step, and its head, or
@@ -72,32 +63,3 @@ def kinematic(arena: Arena, world: WorldState, command: Command, params: Mission
         fell=fell & ~collided,
         outside=outside,
     )
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Kinematic(Executor):
-    """Moves exactly as the primitives say; see `kinematic`."""
-
-    on_terrain = True
-
-    def execute(self, arena: Arena, world: WorldState, command: Command, params: MissionParams) -> Execution:
-        """See `Executor`."""
-        return kinematic(arena, world, command, params)
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Sampled(Executor):
-    """Moves as simulated bipeds were measured to; see `sampled`."""
-
-    places_feet, on_terrain = True, True
-
-    def execute(self, arena: Arena, world: WorldState, command: Command, params: MissionParams) -> Execution:
-        """See `Executor`."""
-        return sampled(arena, world, command, params)
-
-
-BUILT_IN = {"kinematic": Kinematic(), "sampled": Sampled()}
-for _name, _executor in BUILT_IN.items():
-    EXECUTORS.add(_name, _executor)

@@ -8,17 +8,17 @@ from jaxtyping import Array, Bool
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.moving_boxes import boxes_at, only
+from jaxbiped.executors.execution import TOUCH, Execution
+from jaxbiped.executors.params import ExecutorParams
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.boxes import plan_distance
-from jaxbiped.mission.execution import TOUCH, Execution
-from jaxbiped.mission.params import MissionParams
-from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command
 
 CHECKS = 64  # moments of a measurement and what follows it: 3 cm of an obstacle's path at 0.02 m/s and 106 s
 
 
 def met(
-    arena: Arena, world: WorldState, command: Command, executed: Execution, params: MissionParams
+    arena: Arena, world: WorldState, command: Command, executed: Execution, params: ExecutorParams
 ) -> Bool[Array, ""]:
     """Whether a moving box touches one robot while it measures, or while it executes its command.
 

@@ -8,12 +8,12 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height
+from jaxbiped.executors.contact_rules import body_touches, edges, feet_touch, off_ground
+from jaxbiped.executors.execution import ODOMETRY, PLAY, Execution
+from jaxbiped.executors.motion_library import PLAYED, Library
+from jaxbiped.executors.params import ExecutorParams
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
-from jaxbiped.mission.contact_rules import body_touches, edges, feet_touch, off_ground
-from jaxbiped.mission.execution import ODOMETRY, PLAY, Execution
-from jaxbiped.mission.library import PLAYED, Library
-from jaxbiped.mission.params import MissionParams
-from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.counter_rng import fold
@@ -23,7 +23,7 @@ STRAIGHT, TURN, UP, DOWN, SQUAT, SIDE = range(len(PLAYED))
 WAY = (1 / 3, 2 / 3, 1.0)  # fractions of its path at which the body is checked against boxes
 
 
-def sampled(arena: Arena, world: WorldState, command: Command, params: MissionParams) -> Execution:
+def sampled(arena: Arena, world: WorldState, command: Command, params: ExecutorParams) -> Execution:
     """Displacements, falls and stops as measured in simulation (`params.library`); time is Table 2's.
 
     Turn, sideways step and primitive are drawn one after another. Each ends where requested, plus the mean error of the

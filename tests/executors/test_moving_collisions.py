@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.moving_boxes import Movers
+from jaxbiped.executors.execution import Execution
+from jaxbiped.executors.moving_collisions import CHECKS, met
+from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.execution import Execution
-from jaxbiped.mission.moving_collisions import CHECKS, met
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig
-from jaxbiped.mission.state import Planned, WorldState
 from jaxbiped.motion.primitives import Command
 from tests.sensing.scenes import SLOTS, make
 

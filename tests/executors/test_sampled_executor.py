@@ -10,13 +10,13 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from jaxbiped.arenas.scene import load_scene
+from jaxbiped.executors.kinematic_executor import kinematic
+from jaxbiped.executors.motion_library import PLAYED, load_library
+from jaxbiped.executors.sampled_executor import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.executors import kinematic
-from jaxbiped.mission.library import PLAYED, load_library
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import run_logged
-from jaxbiped.mission.sampled_executor import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
 from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive
