@@ -80,7 +80,7 @@ def sense_and_decide(
     """Sense and decide, for a batch: the view, and what `decide` returns. Consumes channel SENSE.
 
     Args:
-      carriage: [B] true pose of each robot's body; None: upright, except for a tilt drawn by the sensor.
+      body_pose: [B] true pose of each robot's body; None: upright, except for a tilt drawn by the sensor.
       seen: what each robot has just measured; None: measure here.
     """
     if seen is None:

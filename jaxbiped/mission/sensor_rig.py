@@ -40,7 +40,7 @@ class SensorRig(Protocol):
         """The measurement of each robot of a batch, as in `mission_step.sense`: the same places, attitudes and seeds.
 
         Args:
-          carriage: [B] true pose of each robot's body; None: upright, except for a random tilt.
+          body_pose: [B] true pose of each robot's body; None: upright, except for a random tilt.
           count: rows from this one on are padding, and may get any value.
         """
         ...
