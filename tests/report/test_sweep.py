@@ -1,6 +1,6 @@
 """The report of a sweep: a figure that fits its axes, tables that say what the rows hold, and the whole command."""
 
-from functools import partial
+from contextlib import nullcontext
 
 import polars as pl
 import pytest
@@ -108,7 +108,7 @@ def test_a_sweep_that_was_stopped_says_so(tmp_path):
 
 def test_the_command(tmp_path, monkeypatch, capsys):
     """From a file to its folder: all of it but the missions."""
-    monkeypatch.setattr(command, "compute_study", partial(compute_study, engine=Engine(made_up)))
+    monkeypatch.setattr(command, "chosen_engine", lambda *_: nullcontext(Engine(made_up)))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.toml").write_text(
         'arenas = 12\nstrategies = ["bump_aware", "floor_only"]\n[[axes]]\nfield = "costs.c3"\nvalues = [5, 10, 20]\n'
