@@ -16,7 +16,7 @@ QUICK := $(addprefix tests/, test_config.py test_docs.py test_errors.py test_fig
   $(addprefix stereo/, test_calibration.py test_images.py test_matching.py test_points.py test_rectify.py) \
   $(addprefix motion/, test_edge.py test_primitives.py) $(addprefix biped/, test_gait.py) \
   $(addprefix physics/, test_inputs.py) \
-  $(addprefix mission/, test_primitive_schedule.py test_recording.py test_scenes.py) \
+  $(addprefix executors/, test_primitive_schedule.py) $(addprefix mission/, test_recording.py test_scenes.py) \
   $(addprefix study/, test_clock.py test_store.py test_sweep.py) \
   $(addprefix statistics/, test_sample_size_plan.py test_schema.py test_sweep_points.py) \
   $(addprefix report/, test_measured.py) $(addprefix viewer/, test_mission_choice.py) \

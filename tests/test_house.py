@@ -23,11 +23,11 @@ AT_THE_TOP = {"cli": "cli", "__main__": "cli", "testing": FRONT}  # modules besi
 UPWARDS: dict[str, tuple[str, ...]] = {}  # imports of a later room, by file: the lines that do it
 CIRCULAR = {  # imports that close a circle, by file: the lines that do it
     # A config is light to load; its traced form, which loads JAX, is made from it.
-    "jaxbiped/mission/config.py": ("from jaxbiped.mission.settings import settings_of",),
+    "jaxbiped/mission/config.py": ("from jaxbiped.mission.params import mission_params",),
     # What is built in is registered when it is first asked for.
-    "jaxbiped/mission/execution.py": (
-        "from jaxbiped.mission import executors",
-        "from jaxbiped.mission.executors import Kinematic, Sampled",
+    "jaxbiped/executors/execution.py": (
+        "from jaxbiped.executors import built_in",
+        "from jaxbiped.executors.built_in import Kinematic, Sampled",
     ),
     "jaxbiped/mission/metric.py": ("from jaxbiped.mission import metrics",),
 }

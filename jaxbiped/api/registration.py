@@ -13,9 +13,9 @@ from jaxbiped.core.names import BUILT_IN_METRICS
 from jaxbiped.core.names import STRATEGIES as BUILT_IN_STRATEGIES
 from jaxbiped.core.registry import EXECUTORS, FAMILIES, METRICS, SENSORS, STRATEGIES, Registry
 from jaxbiped.errors import InputError
+from jaxbiped.executors.execution import Executor
 from jaxbiped.mission.config import EXECUTORS as BUILT_IN_EXECUTORS
 from jaxbiped.mission.config import SENSORS as BUILT_IN_SENSORS
-from jaxbiped.mission.execution import Executor
 from jaxbiped.mission.metric import Metric, as_metric, column_of
 from jaxbiped.mission.sensors import Sensor
 from jaxbiped.mission.strategies import Strategy, as_strategy

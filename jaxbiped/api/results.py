@@ -181,9 +181,9 @@ class Results:
           InputError: a folder that exists, a full disk.
         """
         config, swept = Kept.model_validate(self.config), self.points if self.axes else None
-        with store.create(
-            folder, config, seed=self.config["seed"], arenas=self.config["arenas"], points=swept, metrics=self.shown
-        ) as results:
+        seed, arenas = self.config["seed"], self.config["arenas"]
+        header = store.StudyHeader(config, seed, arenas, points=swept, metrics=self.shown)
+        with store.create(folder, header) as results:
             numbered = self.rows.with_columns(
                 (pl.col("arena") // self.config["shard"]).alias("_block")
             )  # not the name of a metric

@@ -16,7 +16,7 @@ from jaxbiped.planning.planners import Planner
 from jaxbiped.study import store
 from jaxbiped.study.evaluation import Progress
 from jaxbiped.study.evaluation import evaluate as evaluate_shards
-from jaxbiped.study.run_study import conduct, table
+from jaxbiped.study.run_study import Engine, compute_study, table
 from jaxbiped.study.runner import check_mission
 
 
@@ -63,7 +63,8 @@ def _evaluated(study: Study, axes, out, on_progress) -> Results:
     for mission in {point.mission for point in points} if points else {config.mission}:
         check_mission(mission)
     if out is not None:
-        conduct(out, config, points=points, resume=Path(out).exists(), on_progress=on_progress)
+        engine = Engine(on_progress=on_progress)
+        compute_study(out, config, points=points, resume=Path(out).exists(), engine=engine)
         return load(out, own=study.own)
     frames = [frame for _, frame in evaluate_shards(config, on_progress, points=points)]
     swept = table(points) if points else pl.DataFrame({"point": [0]}, schema={"point": pl.Int32})

@@ -11,8 +11,8 @@ from jaxbiped.api.registration import named
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.scene import SceneConfig, load_scene, to_arena, to_terrain
 from jaxbiped.files import new_folder, write_whole
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.recorded_driver import Mission, Played
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.study.runner import check_mission, noise_of, play_one, seeing
@@ -102,5 +102,5 @@ def play(
     chosen = find_strategy(strategy) if isinstance(strategy, str) else named(strategy)
     check_mission(config)
     with seeing(config) as rig:
-        played = play_one(arena, config, chosen, noise_of(seed), on_decision, rig)
+        played = play_one(arena, config, config.params(chosen), noise_of(seed), on_decision, rig)
     return PlayedMission(name, chosen.name, played)

@@ -15,10 +15,10 @@ from jaxbiped.arenas.source import Family
 from jaxbiped.config import input_error
 from jaxbiped.core.names import METRICS
 from jaxbiped.errors import InputError
-from jaxbiped.mission.execution import Executor
+from jaxbiped.executors.execution import Executor
 from jaxbiped.mission.metric import Metric
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensors import Sensor
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import STRATEGIES, Strategy
 from jaxbiped.planning.planners import Planner
 from jaxbiped.statistics.schema import FAMILIES

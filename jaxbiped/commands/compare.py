@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
 
-from jaxbiped.commands.engine_choice import engine
+from jaxbiped.commands.engine_choice import chosen_engine
 from jaxbiped.commands.options.compare import CompareArgs
 from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
@@ -19,7 +20,7 @@ from jaxbiped.study.batching import groups_of, shards, strategies_of
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.resumption import refuse_taken
-from jaxbiped.study.run_study import conduct, never
+from jaxbiped.study.run_study import compute_study, never
 from jaxbiped.study.runner import check_mission
 from jaxbiped.study.stopping import Rule
 
@@ -50,10 +51,11 @@ def main(args: CompareArgs) -> int:
     )
     enough = Rule(goal, out, config.arenas) if goal else never
     with (
-        engine(args, console, len(shards(config, len(groups))), ordered=goal is not None) as how,
+        chosen_engine(args, console, len(shards(config, len(groups))), ordered=goal is not None) as engine,
         progress(console) as show,
     ):
-        manifest = conduct(out, config, resume=args.resume, on_progress=show, enough=enough, **how)
+        engine = replace(engine, on_progress=show)
+        manifest = compute_study(out, config, resume=args.resume, engine=engine, enough=enough)
     report = write_report(out)
     console.print(terminal_report(report))
     for sentence in report.remarks:

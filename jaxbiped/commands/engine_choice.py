@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 from rich.console import Console
 
 from jaxbiped.commands.options.engine import EngineArgs
 from jaxbiped.errors import InputError
+from jaxbiped.study.run_study import HERE, Engine
 
 
 @contextmanager
-def engine(args: EngineArgs, console: Console, shards: int, ordered: bool = False) -> Iterator[dict[str, Any]]:
-    """Arguments of `conduct` that say where shards are computed.
+def chosen_engine(args: EngineArgs, console: Console, shards: int, ordered: bool = False) -> Iterator[Engine]:
+    """Where shards are computed.
 
     Args:
       shards: number of shards of the study.
@@ -24,7 +24,7 @@ def engine(args: EngineArgs, console: Console, shards: int, ordered: bool = Fals
       InputError: the scheduler does not exist, or its workers cannot be used.
     """
     if args.scheduler is None and args.workers is None:
-        yield {}
+        yield HERE
         return
     if args.scheduler is not None and args.workers is not None:
         raise InputError("does not go with --scheduler, which has its own workers", field="workers", value=args.workers)
@@ -39,4 +39,4 @@ def engine(args: EngineArgs, console: Console, shards: int, ordered: bool = Fals
         console.print(f"{count} workers at {cluster.address}, {shards} shards", highlight=False)
         if shards < count:
             console.print("fewer shards than workers: a smaller --shard would keep all of them busy", highlight=False)
-        yield {"engine": cluster, "device": cluster.device, "compile_time": lambda: cluster.seconds}
+        yield Engine(cluster, cluster.device, lambda: cluster.seconds)

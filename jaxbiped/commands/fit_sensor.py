@@ -14,8 +14,8 @@ from jaxbiped.arenas.arena import CIRCLE
 from jaxbiped.commands.options.fit_sensor import FitSensorArgs
 from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing, write_whole
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensor_rig import StereoRig
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.config import CameraConfig, NoiseConfig
 from jaxbiped.study.fitting import ALIKE, Fit, choices, fit, sensor_toml
 from jaxbiped.study.sensors import Place, agreement, fused, looking, mission, same, score, with_rays, worlds

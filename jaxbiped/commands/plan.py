@@ -153,10 +153,7 @@ def write(source: MapSource, plan: Plan, folder: Path, args: PlanArgs) -> None:
     pictures.save_map(
         folder / "map.png",
         grid,
+        pictures.MapOverlay(plan_xy=xy, start_xy=tuple(xy[0]), goal_xy=tuple(xy[-1]), goal_radius=None),
         title=f"{legible(args.file.name)}: cost {plan.costs[-1]:.6g}, {plan.length * grid.pitch:.4g} m",
-        plan_xy=xy,
-        start_xy=tuple(xy[0]),
-        goal_xy=tuple(xy[-1]),
-        goal_radius=None,
         axis=source.axis,
     )

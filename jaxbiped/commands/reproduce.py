@@ -16,7 +16,7 @@ from jaxbiped.arenas import Arena
 from jaxbiped.commands.options.reproduce import ReproduceArgs
 from jaxbiped.config import config_hash, parse
 from jaxbiped.files import refuse_existing
-from jaxbiped.mission.settings import SIMULATED, MissionConfig
+from jaxbiped.mission.params import SIMULATED, MissionConfig
 from jaxbiped.reproduction import EXPERIMENTS, PUBLISHED, fit_measuring
 from jaxbiped.reproduction.files import write
 from jaxbiped.reproduction.findings import Findings

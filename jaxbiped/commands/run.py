@@ -18,7 +18,7 @@ from jaxbiped.mission.recording import FILE, save_log
 from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.report.animation import save_gif
 from jaxbiped.report.pictures import save_mission
-from jaxbiped.study.runner import check_mission, noise_of, play_one, program_of, seeing
+from jaxbiped.study.runner import check_mission, noise_of, play_one, seeing, spec_of
 
 NOT_REACHED = 1  # exit status
 
@@ -37,8 +37,8 @@ def main(args: RunArgs) -> int:
     out = args.out or Path("results") / f"run-{args.scene.stem}-{args.strategy.replace(':', '.')}-{identity}"
     refuse_existing(out)
     name, arena = load_scene(args.scene)
-    static = program_of(args.mission, arena)
-    for text in scene_warnings(arena, args.mission.robot, static.spec.level_height):
+    spec = spec_of(args.mission, arena)
+    for text in scene_warnings(arena, args.mission.robot, spec.grid.level_height):
         print(f"jaxbiped: warning: {args.scene}: {text}", file=sys.stderr)
     strategy = find_strategy(args.strategy)
     check_mission(args.mission)
@@ -50,7 +50,7 @@ def main(args: RunArgs) -> int:
         mission = play_one(
             arena,
             args.mission,
-            strategy,
+            args.mission.params(strategy),
             noise_of(args.seed),
             lambda p: print(f"{p.time:6.0f}s {math.degrees(p.turn):+5.0f}° {100 * p.length:5.1f}cm  {p.name}"),
             rig,

@@ -13,7 +13,7 @@ from jaxbiped.files import new_folder, refuse_existing, write_whole
 from jaxbiped.report.answer_text import answer
 from jaxbiped.report.comparison_report import LIMITATIONS, question
 from jaxbiped.report.grid import to_grid
-from jaxbiped.report.page import PAGE, Section, page_of, render
+from jaxbiped.report.page import PAGE, PageNotes, Section, page_of, render
 from jaxbiped.report.stored import equivalence_sheets, plan_sentences, terminal_sheets, written_sheets
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich
 from jaxbiped.statistics import Comparison
@@ -110,11 +110,13 @@ def write(
         frame,
         comparison,
         sides[0].stored.manifest,
-        title=title,
-        limitations=LIMITATIONS,
-        commands=commands,
-        more=tuple(more),
-        warnings=left_out(sides, frame),
+        PageNotes(
+            title=title,
+            limitations=LIMITATIONS,
+            commands=commands,
+            more=tuple(more),
+            warnings=left_out(sides, frame),
+        ),
     )
     texts = {"comparison.md": "\n".join(lines), PAGE: render(page)}
     with new_folder(out) as folder:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import jax
 from rich.console import Console
 
-from jaxbiped.commands.engine_choice import engine
+from jaxbiped.commands.engine_choice import chosen_engine
 from jaxbiped.commands.options.sweep import SweepArgs
 from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
@@ -19,7 +20,7 @@ from jaxbiped.study.batching import groups_of, shards, strategies_of
 from jaxbiped.study.components import fingerprinted
 from jaxbiped.study.memory_limit import check_memory
 from jaxbiped.study.resumption import refuse_taken
-from jaxbiped.study.run_study import conduct
+from jaxbiped.study.run_study import compute_study
 from jaxbiped.study.runner import check_mission
 from jaxbiped.study.sweep import SweepConfig
 
@@ -45,7 +46,7 @@ def main(args: SweepArgs) -> int:
     for group in groups:
         arenas = min(config.shard, config.arenas)
         queues = max(cores(), jax.local_device_count())
-        check_memory(group.static, len(group.points), len(group.strategies), arenas, queues)
+        check_memory(group.spec, len(group.points), len(group.strategies), arenas, queues)
     for point in points:
         check_mission(point.mission)
     try_rig(config.mission)
@@ -56,8 +57,10 @@ def main(args: SweepArgs) -> int:
     programs = f"{len(groups)} compiled program{'s' * (len(groups) > 1)}"
     what = f"{len(points)} sweep points in {programs}, {config.arenas} arenas each, seed {config.seed}"
     console.print(f"{what}: {', '.join(item.name for item in strategies)}", highlight=False)
-    with engine(args, console, len(shards(config, len(groups), swept=True))) as how, progress(console) as show:
-        manifest = conduct(out, config, points=points, resume=args.resume, on_progress=show, **how)
+    count = len(shards(config, len(groups), swept=True))
+    with chosen_engine(args, console, count) as engine, progress(console) as show:
+        engine = replace(engine, on_progress=show)
+        manifest = compute_study(out, config, points=points, resume=args.resume, engine=engine)
     spent = f"{manifest.wall_time:.0f} s, {manifest.compile_time:.0f} s of them compiling"
     report = write_report(out)
     console.print(terminal_report(report))

@@ -17,9 +17,9 @@ from jaxbiped.commands.options.tune import TuneArgs
 from jaxbiped.commands.progress_bar import progress
 from jaxbiped.config import config_hash
 from jaxbiped.errors import InputError
+from jaxbiped.executors.motion_library import load_library
 from jaxbiped.files import new_folder, refuse_existing, write_whole
-from jaxbiped.mission.library import load_library
-from jaxbiped.mission.settings import program
+from jaxbiped.mission.params import mission_spec
 from jaxbiped.motion.config import DurationConfig
 from jaxbiped.report.tables import to_markdown, to_rich
 from jaxbiped.report.tuning import costs_sheet, costs_toml, fits_sheet, gaps_sheet, missions, sentence, write_tuning
@@ -39,7 +39,7 @@ def main(args: TuneArgs) -> int:
       InputError: a config that cannot be run, a folder that exists or cannot be written, a full disk.
     """
     config = TuneConfig.model_validate(args.model_dump(exclude={"out", "from_durations"}))
-    program(config.mission, (SIZE_X, SIZE_Y))  # refuses invalid configs before anything is computed
+    mission_spec(config.mission, (SIZE_X, SIZE_Y))  # refuses invalid configs before anything is computed
     refuse_timeless(config)
     kind = f"-{args.from_durations}" if args.from_durations else ""
     out = args.out or Path("results") / f"tune{kind}-{config_hash(config)}"

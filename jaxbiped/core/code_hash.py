@@ -15,6 +15,11 @@ import numpy as np
 
 OURS = "jaxbiped"
 ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
+# Modules of classes that components extend, by their former names: these are in the hashes of stored studies.
+FORMER = {
+    "jaxbiped.executors.execution": "jaxbiped.mission.execution",
+    "jaxbiped.executors.built_in": "jaxbiped.mission.executors",
+}
 PLAIN = bool | int | float | complex | str | bytes | None
 
 
@@ -91,6 +96,7 @@ def sources(thing: Any) -> Iterator[str]:
     classes = inspect.getmro(thing) if isinstance(thing, type) else (thing,)
     for item in classes:
         module = getattr(item, "__module__", "") or ""
+        module = FORMER.get(module, module)
         yield f"{module if module != '__main__' else ''} {item.__qualname__}"
         if module.partition(".")[0] in (OURS, "builtins"):
             continue

@@ -13,3 +13,4 @@ SCENE = "scene"  # the family of a hand-written arena
 METRICS = ("spl", "clearance", "replans", "measuring")  # default of a study
 BUILT_IN_METRICS = (*METRICS, "energy")
 MEASURES = ("success", "distance", "time")  # by which strategies are compared
+SIMULATED = ("native", "mjx")  # executors that are simulated bipeds

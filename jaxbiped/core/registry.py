@@ -117,7 +117,7 @@ def is_equal(one: object, other: object) -> bool:
 STRATEGIES: Registry = Registry("strategy", "jaxbiped.planners")  # filled by `mission.strategies`
 FAMILIES: Registry = Registry("family", "jaxbiped.arenas")  # of user families
 SENSORS: Registry = Registry("sensor", "jaxbiped.sensors")  # filled by `mission.sensors`
-EXECUTORS: Registry = Registry("executor", "jaxbiped.executors")  # filled by `mission.executors`
+EXECUTORS: Registry = Registry("executor", "jaxbiped.executors")  # filled by `executors.built_in`
 METRICS: Registry = Registry("metric", "jaxbiped.metrics")  # filled by `mission.metrics`
 
 

@@ -17,7 +17,7 @@ from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped.geometry.pose import Pose, to_robot
 from jaxbiped.mapping.grid import GridSpec, flat_index
-from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, T_robot_camera
+from jaxbiped.sensing.camera import MountedCamera, T_robot_camera
 from jaxbiped.sensing.view import View
 
 if TYPE_CHECKING:
@@ -30,9 +30,7 @@ HIDDEN = 0.05  # [m] by which something lies nearer than what it hides: the size
 class Eye:
     """What a view was measured by, and how much of what was before is kept where it tells otherwise."""
 
-    camera: Camera
-    at: Mount
-    image: ImageSpec
+    camera: MountedCamera
     keep: Float[Array, ""]  # 0 to 1
 
 
@@ -45,7 +43,7 @@ def forget(
       view: brought level, in the robot frame.
       points: its pixels in each voxel.
     """
-    gone = missed(view, points, pose, eye.camera, eye.at, eye.image, spec) & (grid_map.evidence > 0)
+    gone = missed(view, points, pose, eye.camera, spec) & (grid_map.evidence > 0)
     kept = jnp.where(jnp.any(gone | (points > 0), axis=-1), eye.keep, 1.0)[..., None]
     left = jnp.where(gone, eye.keep, 1.0)
     grounds = jnp.moveaxis(left[..., -spec.lowest : spec.ground_levels - spec.lowest], -1, 0)
@@ -62,9 +60,7 @@ def missed(
     view: View,
     points: Float[Array, "H W Z"],
     pose: Pose,
-    camera: Camera,
-    at: Mount,
-    image: ImageSpec,
+    camera: MountedCamera,
     spec: GridSpec,
 ) -> Bool[Array, "H W Z"]:
     """The voxels that one view, brought level, should have measured if they were occupied, and has not.
@@ -78,19 +74,20 @@ def missed(
       points: the pixels of the view in each voxel.
       pose: where the robot believes to stand; `pose.z` [m] the height of its supporting surface.
     """
-    far = nearest_depths(view, camera, at, image)
+    far = nearest_depths(view, camera)
     height, width = spec.shape
     x, y = to_robot(
         pose, ((jnp.arange(width) + 0.5) * spec.pitch)[None], ((jnp.arange(height) + 0.5) * spec.pitch)[:, None]
     )
     z = (jnp.arange(spec.levels) + spec.lowest) * spec.level_height - pose.z
-    depth, index, inside = project(*jnp.broadcast_arrays(x[..., None], y[..., None], z), camera, at, image)
+    depth, index, inside = project(*jnp.broadcast_arrays(x[..., None], y[..., None], z), camera)
     return inside & (far.reshape(-1)[index] > depth - HIDDEN) & (points == 0) & jnp.any(view.weight > 0)
 
 
-def nearest_depths(view: View, camera: Camera, at: Mount, image: ImageSpec) -> Float[Array, "rows columns"]:
+def nearest_depths(view: View, camera: MountedCamera) -> Float[Array, "rows columns"]:
     """[m] least depth that a view measured by each ray and the eight around it; inf where they measured nothing."""
-    depth, index, inside = project(view.x, view.y, view.z, camera, at, image)
+    image = camera.image
+    depth, index, inside = project(view.x, view.y, view.z, camera)
     counts = inside & (view.weight > 0)
     flat = jnp.full(image.rows * image.columns, jnp.inf)
     flat = flat.at[jnp.where(counts, index, 0)].min(jnp.where(counts, depth, jnp.inf))
@@ -100,10 +97,11 @@ def nearest_depths(view: View, camera: Camera, at: Mount, image: ImageSpec) -> F
 
 
 def project(
-    x: Float[Array, "*S"], y: Float[Array, "*S"], z: Float[Array, "*S"], camera: Camera, at: Mount, image: ImageSpec
+    x: Float[Array, "*S"], y: Float[Array, "*S"], z: Float[Array, "*S"], mounted: MountedCamera
 ) -> tuple[Float[Array, "*S"], Int[Array, "*S"], Bool[Array, "*S"]]:
     """Depth [m] of points in the robot frame, the ray nearest to each, and whether it can be measured."""
-    T = T_robot_camera(at)
+    camera, image = mounted.camera, mounted.image
+    T = T_robot_camera(mounted.at)
     dx, dy, dz = x - T[0, 3], y - T[1, 3], z - T[2, 3]
     right, down, depth = (T[0, k] * dx + T[1, k] * dy + T[2, k] * dz for k in range(3))
     near = camera.focal * camera.baseline / camera.max_disparity

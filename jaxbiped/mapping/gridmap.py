@@ -19,7 +19,7 @@ from jaxbiped.mapping.fading import Eye, forget
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body, flat_index
 from jaxbiped.mapping.leveling import level_view
 from jaxbiped.mapping.params import MapParams
-from jaxbiped.mapping.relief import Surfaces, add_surfaces, no_surfaces, surface_share
+from jaxbiped.mapping.relief import PlacedView, Surfaces, add_surfaces, no_surfaces, surface_share
 from jaxbiped.sensing.view import View
 
 AS_GOOD = 0.003  # [m] off its level, up to which the ground that a robot stands on is taken to be at it
@@ -88,33 +88,22 @@ def update(
     if eye is not None:
         points = without_few(voxelise(view, index, counts, spec), params, spec)
         grid_map = forget(grid_map, view, points, pose, eye, spec)
-    return add_view(grid_map, view, pose.z, index, counts, careful(body, params), params, spec)
+    return add_view(grid_map, PlacedView(view, pose.z, index, counts), careful(body, params), params, spec)
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(7,))
-def add_view(
-    grid_map: GridMap,
-    view: View,
-    z: Float[Array, ""],
-    index: Int[Array, "N"],
-    counts: Bool[Array, "N"],
-    body: Body,
-    params: MapParams,
-    spec: GridSpec,
-) -> GridMap:
+@partial(jax.custom_jvp, nondiff_argnums=(4,))
+def add_view(grid_map: GridMap, placed: PlacedView, body: Body, params: MapParams, spec: GridSpec) -> GridMap:
     """The map of one arena after what one more view tells.
 
     Batches of `MANY` maps are read by a compiled kernel on a CPU; smaller ones, and all on other devices, by XLA. The
     results are the same, bit for bit, where the numbers are finite and none is negative.
 
     Args:
-      view: brought level, in the robot frame; `z` [m] the height of what the robot stands on.
-      index, counts: the voxel of each point, and whether it counts.
       body: the careful one (`cobstacles.careful`).
     """
     by_kernel, by_xla = (partial(way, spec=spec) for way in (add_view_by_kernel, add_view_by_xla))
     add = by_batch_size(by_xla, by_platform(by_kernel, by_xla), MANY)
-    return add(grid_map, view, z, index, counts, body, params)
+    return add(grid_map, placed, body, params)
 
 
 @add_view.defjvp
@@ -123,23 +112,24 @@ def add_view_jvp(spec, primals, tangents):
     return jax.jvp(partial(add_view_by_xla, spec=spec), primals, tangents)
 
 
-def add_view_by_xla(grid_map, view, z, index, counts, body, params, spec):
+def add_view_by_xla(grid_map, placed, body, params, spec):
     """`add_view` in JAX."""
-    points = without_few(voxelise(view, index, counts, spec), params, spec)
+    points = without_few(voxelise(placed.view, placed.index, placed.counts, spec), params, spec)
     count = functools.reduce(jnp.add, jnp.unstack(points, axis=-1))  # in this order, which a sum leaves to XLA
     count = jnp.where(count >= params.view_points * spec.cell_share, count, 0.0)
-    surfaces = add_surfaces(grid_map.surfaces, view, z, index, counts, params, spec)
+    surfaces = add_surfaces(grid_map.surfaces, placed, params, spec)
     evidence = grid_map.evidence + points
     classes, levels = class_by_xla(evidence, surfaces, body, params, spec)
     return add_votes(replace(grid_map, evidence=evidence, surfaces=surfaces), count, classes, levels)
 
 
-def add_view_by_kernel(grid_map, view, z, index, counts, body, params, spec):
+def add_view_by_kernel(grid_map, placed, body, params, spec):
     """`add_view` by machine code."""
     from jaxbiped.mapping.kernels import map_update  # with Numba, which takes a second to import
 
     maps = grid_map.evidence, grid_map.votes, grid_map.level_votes, grid_map.surfaces
-    points = jnp.where(counts, index, -1), view.weight, surface_share(view, params), view.z + z
+    view, index = placed.view, jnp.where(placed.counts, placed.index, -1)
+    points = index, view.weight, surface_share(view, params), view.z + placed.z
     evidence, votes, level_votes, weight, rise, *_ = map_update.add_view(
         maps, points, *kernel_settings(body, params, spec), spec
     )

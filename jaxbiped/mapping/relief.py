@@ -41,30 +41,30 @@ class Relief:
     top: Float[Array, "*B H W"]  # at least so high is solid ground in the cell; -inf: there is none
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class PlacedView:
+    """A view brought level, and the voxels that its points lie in."""
+
+    view: View  # in the robot frame
+    z: Float[Array, "*B"]  # [m] height of what the robot stands on
+    index: Int[Array, "*B N"]  # the voxel of each point, as of a flat grid
+    counts: Bool[Array, "*B N"]  # whether it counts
+
+
 def no_surfaces(spec: GridSpec) -> Surfaces:
     """Of one arena before the first view."""
     return Surfaces(*(jnp.zeros((spec.ground_levels, *spec.shape)) for _ in range(2)))
 
 
-def add_surfaces(
-    surfaces: Surfaces,
-    view: View,
-    z: Float[Array, ""],
-    index: Int[Array, "N"],
-    counts: Bool[Array, "N"],
-    params: MapParams,
-    spec: GridSpec,
-) -> Surfaces:
+def add_surfaces(surfaces: Surfaces, placed: PlacedView, params: MapParams, spec: GridSpec) -> Surfaces:
     """The surfaces of one arena after what one more view tells of them.
 
     The error of a height grows in proportion to the distance (`params.height_range`), and a point weighs accordingly.
     Of a raised level only the upper points count, down to `FACE` below the mean so far: seen from far off, a cell at an
     edge shows more of the face than of the top.
-
-    Args:
-      view: brought level, in the robot frame; `z` [m] the height of what the robot stands on.
-      index: the voxel of each point; `counts` which of them count.
     """
+    view, z, index, counts = placed.view, placed.z, placed.index, placed.counts
     level = jnp.maximum(index % spec.levels + spec.lowest, 0)
     counts = counts & (level < spec.ground_levels)
     cell = jnp.where(counts, level * (spec.shape[0] * spec.shape[1]) + index // spec.levels, 0)

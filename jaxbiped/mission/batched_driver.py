@@ -21,11 +21,12 @@ from jaxtyping import Array, Float, Int, UInt32
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready
 from jaxbiped.devices import ALL, EACH, on_each, placed
+from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.mission_step import step
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionParams, MissionSpec
-from jaxbiped.mission.state import AgentState, Planned, WorldState, start
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import AgentState, start
 
 SLOTS = 64  # missions at once: the maps of this many arenas fit in the cache of one core
 TURNS = 32  # decisions between two checks of the queue by the host
@@ -34,10 +35,10 @@ TURNS = 32  # decisions between two checks of the queue by the host
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True)
 class Jobs:
-    """`N` missions to run: their arenas, settings and noise."""
+    """`N` missions to run: their arenas, parameters and noise."""
 
     arena: Int[Array, "N"]  # index into the arenas
-    point: Int[Array, "N"]  # index into the settings
+    point: Int[Array, "N"]  # index into the parameters
     seed: UInt32[Array, "N"]
     count: Int[Array, ""]  # jobs from here on are padding
 
@@ -84,7 +85,7 @@ class Queue:
     """The state between two segments of the loop."""
 
     world: WorldState  # [S]
-    mind: AgentState  # [S]
+    agent: AgentState  # [S]
     job: Int[Array, "S"]  # job of the slot; count or more: idle
     next_job: Int[Array, ""]
     result: Result
@@ -107,44 +108,37 @@ def tally(code: Int[np.ndarray, "N"]) -> Tally:
 
 
 OnProgress = Callable[[Tally], None]
-Work = Callable[[Arena, MissionParams, Jobs, OnProgress], Result]
+Work = Callable[[MissionSetup, Jobs, OnProgress], Result]
 
 
 @with_own_settings
-def compile_queue(
-    arenas: Arena,
-    settings: MissionParams,
-    jobs: Jobs,
-    program: MissionSpec,
-    slots: int = SLOTS,
-    mesh: Mesh | None = None,
-) -> Work:
+def compile_queue(setup: MissionSetup, jobs: Jobs, slots: int = SLOTS, mesh: Mesh | None = None) -> Work:
     """Compile the driver for arguments of these shapes.
 
     Args:
-      arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
-      program: static. One compilation for each (program, slots, A, P, N), shared by later calls.
+      setup: arenas with the leading axis [A] and parameters with [P], which the jobs [N] combine. One compilation for
+        each (spec, slots, A, P, N), shared by later calls.
       slots: static; slots per device.
       mesh: static; devices, each with its own list of jobs, `fill` and `segment`: leaves of jobs, including count, and
         of results then have another leading axis [D].
 
     Returns:
-      A function of (arenas, settings, jobs, on_progress) that processes the queue and returns results in the order of
-      the jobs; padding stays RUNNING. Several threads may call it at once. `on_progress` is called on the host with the
+      A function of (setup, jobs, on_progress) that processes the queue and returns results in the order of the
+      jobs; padding stays RUNNING. Several threads may call it at once. `on_progress` is called on the host with the
       tally of the jobs, every `TURNS` decisions.
     """
-    signature = (program, slots, mesh, jax.tree.structure((arenas, settings, jobs)), *shapes((arenas, settings, jobs)))
+    signature = (slots, mesh, jax.tree.structure((setup, jobs)), *shapes((setup, jobs)))
     if signature not in COMPILED:
-        begun, turned = partial(fill, program=program, slots=slots), partial(segment, program=program)
+        begun, turned = partial(fill, slots=slots), segment
         if mesh is None:
             begun, turned = jax.jit(begun), jax.jit(turned, donate_argnums=0)
         else:
-            begun = on_each(on_row(begun, 2), mesh, (ALL, ALL, EACH))
-            turned = on_each(on_row(turned, 0, 3), mesh, (EACH, ALL, ALL, EACH), donate_argnums=0)
-        queue = jax.eval_shape(begun, arenas, settings, jobs)
-        given, going = (arenas, settings, jobs), (queue, arenas, settings, jobs)
+            begun = on_each(on_row(begun, 1), mesh, (ALL, EACH))
+            turned = on_each(on_row(turned, 0, 2), mesh, (EACH, ALL, EACH), donate_argnums=0)
+        queue = jax.eval_shape(begun, setup, jobs)
+        given, going = (setup, jobs), (queue, setup, jobs)
         if mesh is None:
-            static = program, slots, TURNS
+            static = slots, TURNS
             COMPILED[signature] = (
                 ready("queue.fill", given, static, lambda: begun.lower(*given)),
                 ready("queue.segment", going, static, lambda: turned.lower(*going), wide),
@@ -154,13 +148,13 @@ def compile_queue(
     first, further = COMPILED[signature]
 
     @with_own_settings
-    def work(arenas: Arena, settings: MissionParams, jobs: Jobs, on_progress: OnProgress) -> Result:
+    def work(setup: MissionSetup, jobs: Jobs, on_progress: OnProgress) -> Result:
         if mesh is not None:
-            arenas, settings, jobs = placed(arenas, mesh, ALL), placed(settings, mesh, ALL), placed(jobs, mesh, EACH)
+            setup, jobs = placed(setup, mesh, ALL), placed(jobs, mesh, EACH)
         count = np.asarray(jobs.count)[..., None]
-        queue = first(arenas, settings, jobs)
+        queue = first(setup, jobs)
         while True:
-            queue = further(queue, arenas, settings, jobs)
+            queue = further(queue, setup, jobs)
             code, job = jax.device_get((queue.result.code, queue.job))
             on_progress(tally(code))
             if np.all(job >= count):
@@ -198,18 +192,18 @@ def shapes(tree) -> list:
     return [(leaf.shape, str(leaf.dtype)) for leaf in jax.tree.leaves(tree)]
 
 
-def fill(arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpec, slots: int) -> Queue:
+def fill(setup: MissionSetup, jobs: Jobs, slots: int) -> Queue:
     """The queue with its first jobs in the slots."""
     job = jnp.arange(slots, dtype=jnp.int32)
-    world, mind = begin(arenas, settings, jobs, job, program)
+    world, agent = begin(setup, jobs, job)
     zero, none = jnp.zeros(jobs.arena.shape), jnp.zeros(jobs.arena.shape, jnp.int32)
     planned = Planned(zero, none, zero)
     metrics = jax.tree.map(lambda leaf: jnp.zeros((*zero.shape, *leaf.shape[1:]), leaf.dtype), world.metrics)
     result = Result(none + Code.RUNNING, zero, zero, none, none, zero, zero, zero, planned, metrics)
-    return Queue(world, mind, job, jnp.int32(slots), result)
+    return Queue(world, agent, job, jnp.int32(slots), result)
 
 
-def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, program: MissionSpec) -> Queue:
+def segment(queue: Queue, setup: MissionSetup, jobs: Jobs) -> Queue:
     """Run up to `TURNS` decisions of every slot."""
 
     def unfinished(carry: tuple[Array, Queue]):
@@ -218,10 +212,9 @@ def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, pr
 
     def turn(carry: tuple[Array, Queue]):
         turns, queue = carry
-        at = jnp.minimum(queue.job, jobs.arena.shape[0] - 1)
-        arena = pick(arenas, jobs.arena[at])
-        world, mind, *_ = step(queue.world, queue.mind, arena, pick(settings, jobs.point[at]), program)
-        return turns + 1, advance(Queue(world, mind, queue.job, queue.next_job, queue.result), arena)
+        mine = setup_of(setup, jobs, queue.job)
+        world, agent, *_ = step(queue.world, queue.agent, mine)
+        return turns + 1, advance(Queue(world, agent, queue.job, queue.next_job, queue.result), mine.arena)
 
     def advance(queue: Queue, arena: Arena) -> Queue:
         """Record the missions that have ended, and give their slots the next jobs."""
@@ -231,30 +224,32 @@ def segment(queue: Queue, arenas: Arena, settings: MissionParams, jobs: Jobs, pr
         row = jnp.where(ended, queue.job, jobs.arena.shape[0])
         result = jax.tree.map(lambda all, new: all.at[row].set(new, mode="drop"), queue.result, last)
         job = jnp.where(ended, queue.next_job + jnp.cumsum(ended) - 1, queue.job).astype(jnp.int32)
-        fresh_world, fresh_mind = begin(arenas, settings, jobs, job, program)
+        fresh_world, fresh_agent = begin(setup, jobs, job)
 
         def renew(new, old):
             return jnp.where(ended.reshape(-1, *[1] * (new.ndim - 1)), new, old)
 
         world = jax.tree.map(renew, fresh_world, world)
-        # The map is left as it is: a fresh mind does not read it, and clearing it here would cost a pass over it.
-        grid_map = queue.mind.grid_map
-        mind = jax.tree.map(renew, replace(fresh_mind, grid_map=None), replace(queue.mind, grid_map=None))
-        mind = replace(mind, grid_map=grid_map)
-        return Queue(world, mind, job, queue.next_job + jnp.sum(ended, dtype=jnp.int32), result)
+        # The map is left as it is: a fresh agent does not read it, and clearing it here would cost a pass over it.
+        grid_map = queue.agent.grid_map
+        agent = jax.tree.map(renew, replace(fresh_agent, grid_map=None), replace(queue.agent, grid_map=None))
+        agent = replace(agent, grid_map=grid_map)
+        return Queue(world, agent, job, queue.next_job + jnp.sum(ended, dtype=jnp.int32), result)
 
     return jax.lax.while_loop(unfinished, turn, (jnp.int32(0), queue))[1]
 
 
-def begin(
-    arenas: Arena, settings: MissionParams, jobs: Jobs, job: Int[Array, "S"], program: MissionSpec
-) -> tuple[WorldState, AgentState]:
+def setup_of(setup: MissionSetup, jobs: Jobs, job: Int[Array, "S"]) -> MissionSetup:
+    """The setups of some jobs; beyond the last one, that of the last."""
+    at = jnp.minimum(job, jobs.arena.shape[0] - 1)
+    return replace(setup, arena=pick(setup.arena, jobs.arena[at]), params=pick(setup.params, jobs.point[at]))
+
+
+def begin(setup: MissionSetup, jobs: Jobs, job: Int[Array, "S"]) -> tuple[WorldState, AgentState]:
     """Fresh missions for the jobs of all slots; a slot without a job gets one that has ended."""
     at = jnp.minimum(job, jobs.arena.shape[0] - 1)
-    arena, setting = pick(arenas, jobs.arena[at]), pick(settings, jobs.point[at])
-    begun = jax.vmap(start, in_axes=(0, 0, 0, None, None))
-    world, mind = begun(arena, setting, jobs.seed[at], program.spec, program.localisation)
-    return replace(world, code=jnp.where(job < jobs.count, world.code, Code.REACHED)), mind
+    world, agent = jax.vmap(start)(setup_of(setup, jobs, job), jobs.seed[at])
+    return replace(world, code=jnp.where(job < jobs.count, world.code, Code.REACHED)), agent
 
 
 def pick(tree, index: Int[Array, "S"]):

@@ -1,4 +1,4 @@
-"""The options of a mission: the config for users. `mission.settings` has its traced form, and loads JAX."""
+"""The options of a mission: the config for users. `mission.params` has its traced form, and loads JAX."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import pydantic
 
-from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.config import Model
+from jaxbiped.core.names import SIMULATED as SIMULATED
 from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
 from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.core.registry import known_name
+from jaxbiped.executors.config import WalkConfig as WalkConfig
 from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mission.defaults import BELOW_POINTS as BELOW_POINTS
-from jaxbiped.mission.defaults import SIMULATED as SIMULATED
 from jaxbiped.mission.defaults import SWAYING as SWAYING
 from jaxbiped.mission.defaults import with_defaults
 from jaxbiped.motion.config import HEIGHT_TOLERANCE, DurationConfig, RobotConfig
@@ -24,7 +24,7 @@ from jaxbiped.sensing.presets import PRESETS, sensor_preset
 
 if TYPE_CHECKING:
     from jaxbiped.mapping.grid import GridSpec
-    from jaxbiped.mission.settings import MissionParams
+    from jaxbiped.mission.params import MissionParams
     from jaxbiped.mission.strategies import Strategy
     from jaxbiped.planning.costs import Costs
 
@@ -93,27 +93,6 @@ class LimitConfig(Model):
     """[m] Largest error of the ground's height after a step; simulated bipeds tolerated -12 to +8 mm."""
     start_sd: tuple[float, float] = (0.002, 0.005)
     """[m, rad] Standard deviations of the initial pose."""
-
-
-class WalkConfig(Model):
-    """How simulated bipeds walk, and where."""
-
-    pace: Literal["fast", "paper"] = "fast"
-    """Speed of simulated primitives; the mission's clock counts Table 2's durations in any case."""
-    slots: Annotated[int, pydantic.Field(ge=1, le=65536)] = 32
-    """Number of bipeds simulated at once."""
-    device: Literal["cpu", "gpu", "tpu"] | None = None
-    """Device of `mjx`; None: JAX's default."""
-    threads: Annotated[int, pydantic.Field(ge=0, le=1024)] = 0
-    """Threads of `native`; 0: one per logical CPU."""
-    impl: Literal["jax", "warp"] = "jax"
-    """Of `mjx`."""
-    biped: RobotModelConfig = RobotModelConfig()
-
-    def options(self, executor: str) -> dict[str, Any]:
-        """Options for `physics.make`."""
-        own = {"threads": self.threads} if executor == "native" else {"impl": self.impl}
-        return own | {"device": self.device}
 
 
 class MissionConfig(Model):
@@ -187,8 +166,10 @@ class MissionConfig(Model):
         above = max(spec.levels + spec.lowest, min(grounds + HEADROOM, 32))
         return replace(spec, lowest=lowest, levels=above - lowest, ground_levels=grounds)
 
-    def settings(self, strategy: str | Strategy) -> MissionParams:
+    def params(self, strategy: str | Strategy) -> MissionParams:
         """The traced part, for one strategy or the one of a name."""
-        from jaxbiped.mission.settings import settings_of
+        from jaxbiped.mission.params import mission_params
 
-        return settings_of(self, strategy)
+        return mission_params(self, strategy)
+
+    settings = params  # its former name, which scripts may use

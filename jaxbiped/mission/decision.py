@@ -12,8 +12,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import mapping, planning
-from jaxbiped.arenas.arena import Arena
-from jaxbiped.geometry.pose import Pose, wrap_angle
+from jaxbiped.executors.world_state import Planned
+from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.fading import Eye
@@ -21,13 +21,15 @@ from jaxbiped.mission.foot_placement import place_feet
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.localising import localise
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.mission.route import pose_problem
-from jaxbiped.mission.settings import MissionParams, MissionSpec
-from jaxbiped.mission.state import AgentState, Planned
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import AgentState
+from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.selection import cell_of, select, stride
 from jaxbiped.planning.planners import FINE, TOO_SLOW, Problem, Route
-from jaxbiped.sensing.camera import mount
+from jaxbiped.sensing.camera import MountedCamera, mount
 from jaxbiped.sensing.view import Sightings, View
 
 LOOK_AROUND = jnp.pi / 2  # [rad] turn between measurements when no path is known
@@ -50,12 +52,10 @@ class DecisionTrace:
 
 @with_own_settings
 def decide(
-    mind: AgentState,
+    agent: AgentState,
     view: View,
     sightings: Sightings,
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
+    setup: MissionSetup,
     active: Bool[Array, "B"] | None = None,
 ) -> tuple[AgentState, Command, Int[Array, "B"], DecisionTrace]:
     """The next action of each robot. All arguments have a leading batch axis.
@@ -66,34 +66,32 @@ def decide(
       active: robots whose decision is used; by default all.
 
     Returns:
-      The mind after the measurement, the command, the code with which the robot itself ends the mission (else
+      The agent after the measurement, the command, the code with which the robot itself ends the mission (else
       RUNNING), and the decision trace.
     """
-    mind, classes, levels, ij = perceive(mind, view, sightings, arena, settings, program)
-    spec = program.spec
-    blind = settings.strategy.blind
-    plan_classes = jnp.where(blind[:, None, None], jnp.int8(Cell.FLOOR), classes)
-    plan_levels = jnp.where(blind[:, None, None], jnp.int8(0), levels)
-    rules = settings.strategy.rules()
+    params, spec = setup.params, setup.spec
+    agent, local = perceive(agent, view, sightings, setup)
+    blind = params.strategy.blind
+    planned = replace(
+        local,
+        classes=jnp.where(blind[:, None, None], jnp.int8(Cell.FLOOR), local.classes),
+        levels=jnp.where(blind[:, None, None], jnp.int8(0), local.levels),
+    )
+    rules = params.strategy.rules()
     goal_ij = jax.vmap(goal_cell, in_axes=(0, 0, 0, 0, None))(
-        arena.goal_xy, settings.limits.goal_radius, plan_classes, rules, spec
+        setup.arena.goal_xy, params.limits.goal_radius, planned.classes, rules, spec.grid
     )
-    heading = jax.vmap(nearest_direction)(mind.belief.pose.yaw)
-    yaw = mind.belief.pose.yaw
-    problem = pose_problem(
-        plan_classes, plan_levels, goal_ij, ij, heading, yaw, settings, program, active, mind.plan_state
-    )
-    route = settings.planner.plan_batch(problem)
-    mind = replace(mind, plan_state=route.state, planned=counted(mind.planned, route))
-    mind, command, verdict = jax.vmap(choose, in_axes=(0, 0, 0, 0, 0, 0, 0, 0, 0, None))(
-        mind, view, ij, goal_ij, route.directions, classes, levels, blind, settings, program
-    )
+    problem = pose_problem(planned, goal_ij, params, spec, active, agent.plan_state)
+    route = params.planner.plan_batch(problem)
+    agent = replace(agent, plan_state=route.state, planned=counted(agent.planned, route))
+    agent, command, verdict = jax.vmap(choose)(agent, view, local, goal_ij, route.directions, setup)
     if route.fault is not None:
         code = jnp.where(route.fault == TOO_SLOW, Code.PLANNER_TIMEOUT, Code.PLANNER_FAILED)
         verdict = jnp.where(route.fault == FINE, verdict, code).astype(jnp.int32)
-    evidence = mind.grid_map.evidence
-    thought = DecisionTrace(classes, levels, problem, route, mind.belief.pose, view, evidence, sightings.seen)
-    return mind, command, verdict, thought
+    evidence = agent.grid_map.evidence
+    known = local.classes, local.levels, problem, route
+    thought = DecisionTrace(*known, agent.belief.pose, view, evidence, sightings.seen)
+    return agent, command, verdict, thought
 
 
 def counted(planned: Planned, route: Route) -> Planned:
@@ -105,81 +103,73 @@ def counted(planned: Planned, route: Route) -> Planned:
     return Planned(planned.seconds + seconds, planned.calls + 1, jnp.where(first, cost, planned.cost))
 
 
-def perceive(
-    mind: AgentState, view: View, sightings: Sightings, arena: Arena, settings: MissionParams, program: MissionSpec
-) -> tuple[AgentState, Int[Array, "B H W"], Int[Array, "B H W"], Int[Array, "B 2"]]:
-    """Update each robot with a measurement: its mind, the classed map, and its cell."""
-    mind = jax.vmap(localise, in_axes=(0, 0, 0, 0, 0, None))(mind, view, sightings, arena.landmarks, settings, program)
-    mind = begin_maps(mind, settings, program.spec)
-    return jax.vmap(read_map, in_axes=(0, 0, 0, None))(mind, view, settings, program)
+def perceive(agent: AgentState, view: View, sightings: Sightings, setup: MissionSetup) -> tuple[AgentState, LocalMap]:
+    """Update each robot with a measurement: its state, and the classed map with its place on it."""
+    agent = jax.vmap(localise)(agent, view, sightings, setup)
+    agent = begin_maps(agent, setup.params, setup.spec.grid)
+    return jax.vmap(read_map, in_axes=(0, 0, 0, None))(agent, view, setup.params, setup.spec)
 
 
-def begin_maps(mind: AgentState, settings: MissionParams, spec: GridSpec) -> AgentState:
-    """Give fresh minds a map of only the ground that their robot stands on.
+def begin_maps(agent: AgentState, params: MissionParams, grid: GridSpec) -> AgentState:
+    """Give fresh agents a map of only the ground that their robot stands on.
 
-    Few minds of a batch are fresh at once, and maps are large: only theirs are written.
+    Few agents of a batch are fresh at once, and maps are large: only theirs are written.
     """
-    pose = mind.belief.pose
+    pose = agent.belief.pose
 
     def begin(n, grid_map):
         k = fresh[n]
         first = mapping.mark_footprint(
-            mapping.empty(spec), pose.x[k], pose.y[k], pose.z[k], settings.limits.body_radius[k], spec
+            mapping.empty(grid), pose.x[k], pose.y[k], pose.z[k], params.limits.body_radius[k], grid
         )
         return jax.tree.map(lambda maps, new: maps.at[k].set(new), grid_map, first)
 
-    fresh = jnp.argsort(~mind.fresh)  # their indices come first
-    grid_map = jax.lax.fori_loop(0, jnp.sum(mind.fresh), begin, mind.grid_map)
-    return replace(mind, grid_map=grid_map, fresh=jnp.zeros_like(mind.fresh))
+    fresh = jnp.argsort(~agent.fresh)  # their indices come first
+    grid_map = jax.lax.fori_loop(0, jnp.sum(agent.fresh), begin, agent.grid_map)
+    return replace(agent, grid_map=grid_map, fresh=jnp.zeros_like(agent.fresh))
 
 
-def level_of(z: Float[Array, ""], spec: GridSpec) -> Int[Array, ""]:
+def level_of(z: Float[Array, ""], grid: GridSpec) -> Int[Array, ""]:
     """The level [int8] of ground of height `z` [m]."""
-    return jnp.round(z / spec.level_height).astype(jnp.int8)
+    return jnp.round(z / grid.level_height).astype(jnp.int8)
 
 
-def read_map(
-    mind: AgentState, view: View, settings: MissionParams, program: MissionSpec
-) -> tuple[AgentState, Int[Array, "H W"], Int[Array, "H W"], Int[Array, "2"]]:
-    """Update one robot with one more view: its mind, the classed map, and its cell.
+def read_map(agent: AgentState, view: View, params: MissionParams, spec: MissionSpec) -> tuple[AgentState, LocalMap]:
+    """Update one robot with one more view: its state, and the classed map with its place on it.
 
     Heights are counted level by level; the offset of its ground from a level was measured before it stepped there.
     """
-    spec, pose = program.spec, mind.belief.pose
-    ij = cell_of(pose.x, pose.y, spec)
-    tilted = not program.knows_pose
+    grid, pose = spec.grid, agent.belief.pose
+    ij = cell_of(pose.x, pose.y, grid)
+    tilted = not spec.knows_pose
     if tilted:
-        pose = replace(pose, z=mapping.ground_height(mind.grid_map, ij, pose.z, spec))
-        mind = replace(mind, belief=replace(mind.belief, pose=pose))
-    eye = eye_of(mind, settings, program) if program.fading else None
-    grid_map = mapping.update(mind.grid_map, view, pose, settings.body, settings.mapping, spec, tilted, eye)
-    classes, levels = mapping.classify(grid_map, settings.mapping, spec)
+        pose = replace(pose, z=mapping.ground_height(agent.grid_map, ij, pose.z, grid))
+        agent = replace(agent, belief=replace(agent.belief, pose=pose))
+    eye = eye_of(agent, params, spec) if spec.fading else None
+    grid_map = mapping.update(agent.grid_map, view, pose, params.body, params.mapping, grid, tilted, eye)
+    classes, levels = mapping.classify(grid_map, params.mapping, grid)
     # The robot can stand where it stands, on its current level, whatever the map says.
-    level = level_of(pose.z, spec)
+    level = level_of(pose.z, grid)
     own = classes[ij[0], ij[1]]
     ground = jnp.where(level > 0, Cell.BUMP, Cell.FLOOR).astype(jnp.int8)
     classes = classes.at[ij[0], ij[1]].set(jnp.where(own == Cell.GATE, own, ground))
     levels = levels.at[ij[0], ij[1]].set(level)
-    return replace(mind, grid_map=grid_map), classes, levels, ij
+    return replace(agent, grid_map=grid_map), LocalMap(classes, levels, ij, pose, grid)
 
 
-def eye_of(mind: AgentState, settings: MissionParams, program: MissionSpec) -> Eye:
+def eye_of(agent: AgentState, params: MissionParams, spec: MissionSpec) -> Eye:
     """How a robot measures, and how much it keeps of older evidence that contradicts its new view."""
-    at = mount(settings.camera, mind.look, mind.squat)
-    return Eye(settings.camera, at, program.image, keep=jnp.exp(-mind.since / settings.mapping.fade))
+    at = mount(params.camera, agent.look, agent.squat)
+    return Eye(MountedCamera(params.camera, at, spec.image), keep=jnp.exp(-agent.since / params.mapping.fade))
 
 
 def choose(
-    mind: AgentState,
+    agent: AgentState,
     view: View,
-    ij: Int[Array, "2"],
+    local: LocalMap,
     goal_ij: Int[Array, "2"],
     directions: Int[Array, "n"],
-    classes: Int[Array, "H W"],
-    levels: Int[Array, "H W"],
-    blind: Bool[Array, ""],
-    settings: MissionParams,
-    program: MissionSpec,
+    setup: MissionSetup,
 ) -> tuple[AgentState, Command, Int[Array, ""]]:
     """The command of one robot, and whether it gives up.
 
@@ -187,20 +177,21 @@ def choose(
     Without a path it turns on the spot and measures again, all around, before it gives up. The blind strategy
     stops at anything but floor.
     """
-    spec = program.spec
-    first = jnp.maximum(directions[: stride(spec)], 0)
-    command = select(mind.belief.pose, ij, first, classes, levels, mind.look, spec)
-    if program.footing:
-        mind, command = place_feet(mind, view, command, ij, directions, classes, levels, settings, program)
+    params, spec, blind = setup.params, setup.spec, setup.params.strategy.blind
+    classes, levels, ij = local.classes, local.levels, local.ij
+    first = jnp.maximum(directions[: stride(spec.grid)], 0)
+    command = select(local, first, agent.look)
+    if spec.footing:
+        agent, command = place_feet(agent, view, command, local, directions, setup)
     at_goal = jnp.all(ij == goal_ij)
     lost = (directions[0] < 0) & ~at_goal
-    tries = jnp.where(lost, mind.tries + 1, 0)
+    tries = jnp.where(lost, agent.tries + 1, 0)
     step = jnp.asarray(planning.DIRECTIONS)[jnp.maximum(directions[0], 0)]
     i, j = ij[0] + step[0], ij[1] + step[1]
     ahead, climb = classes[i, j], levels[i, j] - levels[ij[0], ij[1]]
     halted = blind & ~lost & (((ahead != Cell.FLOOR) & (ahead != Cell.UNMEASURED)) | (climb != 0))
 
-    verdict = jnp.where(tries >= settings.limits.max_looks, Code.NO_PATH, Code.RUNNING)
+    verdict = jnp.where(tries >= params.limits.max_looks, Code.NO_PATH, Code.RUNNING)
     verdict = jnp.where(at_goal | halted, Code.STUCK, verdict)
     still = lost | (verdict != Code.RUNNING)
     zero = jnp.zeros(())
@@ -209,19 +200,13 @@ def choose(
         primitive=jnp.where(still, Primitive.NONE, command.primitive),
         length=jnp.where(still, zero, command.length),
         rise=jnp.where(still, 0, command.rise),
-        squat=jnp.where(still | (command.primitive == Primitive.LOOK), mind.squat, command.squat),
+        squat=jnp.where(still | (command.primitive == Primitive.LOOK), agent.squat, command.squat),
         left=jnp.where(still, zero, command.left),
     )
     look = command.primitive == Primitive.LOOK
-    return replace(mind, squat=command.squat, look=look, tries=tries), command, verdict.astype(jnp.int32)
+    return replace(agent, squat=command.squat, look=look, tries=tries), command, verdict.astype(jnp.int32)
 
 
-def nearest_direction(yaw: Float[Array, ""]) -> Int[Array, ""]:
-    """Index into DIRECTIONS of the move closest to a yaw [rad]."""
-    moves = jnp.asarray(planning.DIRECTIONS, jnp.float32)
-    return jnp.argmin(jnp.abs(wrap_angle(jnp.arctan2(moves[:, 0], moves[:, 1]) - yaw))).astype(jnp.int32)
-
-
-def climbed(pose: Pose, rise: Int[Array, ""], spec: GridSpec) -> Pose:
+def climbed(pose: Pose, rise: Int[Array, ""], grid: GridSpec) -> Pose:
     """The believed pose after a step of `rise` levels."""
-    return replace(pose, z=pose.z + rise * spec.level_height)
+    return replace(pose, z=pose.z + rise * grid.level_height)

@@ -18,7 +18,6 @@ from jaxbiped.sensing.presets import sensor_preset
 
 SWAYING = 0.125  # [m] a walking biped sways, and its stereo camera, as wide as the body, sweeps 12 cm to each side
 BELOW_POINTS = 50.0  # for rendered stereo; others keep the map that was published
-SIMULATED = ("native", "mjx")  # executors that are simulated bipeds
 
 OTHER = ""  # stands for all values not in a table
 # Choice: value: resulting defaults of other fields.

@@ -14,19 +14,19 @@ MARGIN = 0.02  # [m] a robot this far from the cell's centre must still be withi
 
 
 def goal_cell(
-    goal_xy: Float[Array, "2"], radius: Float[Array, ""], classes: Int[Array, "H W"], rules: Rules, spec: GridSpec
+    goal_xy: Float[Array, "2"], radius: Float[Array, ""], classes: Int[Array, "H W"], rules: Rules, grid: GridSpec
 ) -> Int[Array, "2"]:
     """Of the cells whose centre is well within `radius` [m] of the goal, the nearest that is not blocked.
 
     The goal is reached within a circle (paper, 3.1), so a wall beside it must not block it. If all are blocked, the
     cell that contains the goal.
     """
-    rows, columns = jnp.arange(spec.shape[0]), jnp.arange(spec.shape[1])
-    dx, dy = (columns + 0.5) * spec.pitch - goal_xy[0], (rows + 0.5) * spec.pitch - goal_xy[1]
+    rows, columns = jnp.arange(grid.shape[0]), jnp.arange(grid.shape[1])
+    dx, dy = (columns + 0.5) * grid.pitch - goal_xy[0], (rows + 0.5) * grid.pitch - goal_xy[1]
     away = jnp.hypot(dx[None, :], dy[:, None])
-    own = cell_of(goal_xy[0], goal_xy[1], spec)
+    own = cell_of(goal_xy[0], goal_xy[1], grid)
     away = away.at[own[0], own[1]].set(0.0)
     near = (away <= radius - MARGIN) & (cell_kinds(classes, rules) != FORBIDDEN)
     best = jnp.argmin(jnp.where(near, away, jnp.inf))
-    found = jnp.stack(jnp.unravel_index(best, spec.shape)).astype(jnp.int32)
+    found = jnp.stack(jnp.unravel_index(best, grid.shape)).astype(jnp.int32)
     return jnp.where(jnp.any(near), found, own)

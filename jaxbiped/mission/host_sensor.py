@@ -48,7 +48,7 @@ class HostSensor(Sensor):
         if not isinstance(self.points, int) or not 1 <= self.points <= 1_000_000:
             raise InputError("must be 1 to 1000000", field="HostSensor: points", value=self.points)
 
-    def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+    def measure(self, arena: Any, at: Standpoint, params: Any, spec: Any) -> View:
         """See `Sensor`."""
         leaves, structure = jax.tree.flatten(arena)
         shapes = [jnp.shape(leaf) for leaf in leaves]
@@ -86,18 +86,20 @@ def caller(function: ViewFunction, points: int, structure, shapes: tuple, flags:
             for k, (where, looks, squats, number) in enumerate(at):
                 own = [row[k] > 0 if flag else row[k].copy() for row, flag in zip(rows, flags, strict=True)]
                 rng = np.random.default_rng(int(number))
-                out[k] = measured(function, points, structure.unflatten(own), where, bool(looks), bool(squats), rng)
+                place = tuple(map(float, where))
+                seen = structure.unflatten(own), place, bool(looks), bool(squats), rng
+                out[k] = measured(function, points, seen)
             return (out.reshape(*lead, 4, points),)
 
         CALLERS[key] = call
     return CALLERS[key]
 
 
-def measured(function: ViewFunction, points: int, arena, pose, looks_down, squat, rng) -> np.ndarray:
-    """Columns x, y, z and weight [4, points] of one measurement; NaN if the function failed."""
+def measured(function: ViewFunction, points: int, arguments: tuple) -> np.ndarray:
+    """Columns x, y, z and weight [4, points] of one measurement with these arguments; NaN if the function failed."""
     columns = np.zeros((4, points), np.float32)
     try:
-        made = np.asarray(function(arena, tuple(map(float, pose)), looks_down, squat, rng), dtype=np.float32)
+        made = np.asarray(function(*arguments), dtype=np.float32)
         if made.ndim != 2 or made.shape[1] not in (3, 4) or len(made) > points:
             raise ValueError(f"must return points [n, 3] or [n, 4], n at most {points}, not {list(made.shape)}")
         columns[3, : len(made)] = 1.0

@@ -11,57 +11,52 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, UInt32
 
-from jaxbiped.arenas.arena import Arena, Landmarks
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation.kalman_filter import Belief, correct, predict_seen
 from jaxbiped.localisation.scan_match import add_walls, find_walls, match, picture_shape
 from jaxbiped.mapping import level_view
-from jaxbiped.mission.settings import ICP, VISUAL, MissionParams, MissionSpec
-from jaxbiped.mission.state import AgentState, Anchor, WorldState
+from jaxbiped.mission.params import ICP, VISUAL, MissionParams, MissionSpec
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import AgentState, Anchor
 from jaxbiped.sensing.camera import mount
 from jaxbiped.sensing.motion import track
 from jaxbiped.sensing.view import Sightings, View
 
 
-def localise(
-    mind: AgentState,
-    view: View,
-    sightings: Sightings,
-    landmarks: Landmarks,
-    settings: MissionParams,
-    program: MissionSpec,
-) -> AgentState:
-    """The mind after a view has updated the robot's pose."""
-    if program.localisation == "landmarks":
-        return replace(mind, belief=correct(mind.belief, landmarks, sightings))
-    if program.localisation in VISUAL:
-        mind = replace(mind, belief=by_motion(mind, sightings))
-    if program.localisation in ICP:
-        mind = by_walls(mind, view, settings, program)
-    if program.localisation in VISUAL:
+def localise(agent: AgentState, view: View, sightings: Sightings, setup: MissionSetup) -> AgentState:
+    """The agent after a view has updated the robot's pose."""
+    spec = setup.spec
+    if spec.localisation == "landmarks":
+        return replace(agent, belief=correct(agent.belief, setup.arena.landmarks, sightings))
+    if spec.localisation in VISUAL:
+        agent = replace(agent, belief=by_motion(agent, sightings))
+    if spec.localisation in ICP:
+        agent = by_walls(agent, view, setup.params, spec)
+    if spec.localisation in VISUAL:
         zero = jnp.zeros(3)
-        here = Anchor(mind.belief, mind.look, mind.squat, zero, zero, jnp.ones_like(mind.fresh))
-        mind = replace(mind, anchor=here)
-    return mind
+        here = Anchor(agent.belief, agent.look, agent.squat, zero, zero, jnp.ones_like(agent.fresh))
+        agent = replace(agent, anchor=here)
+    return agent
 
 
-def by_motion(mind: AgentState, sightings: Sightings) -> Belief:
+def by_motion(agent: AgentState, sightings: Sightings) -> Belief:
     """The belief from visual motion since the last view if it was measured; otherwise from dead reckoning."""
-    anchor, motion = mind.anchor, sightings.motion
+    anchor, motion = agent.anchor, sightings.motion
     belief, good = predict_seen(anchor.belief, anchor.moved, anchor.variances, motion)
     good = good & anchor.some
-    pose = Pose(belief.pose.x, belief.pose.y, mind.belief.pose.z, belief.pose.yaw)  # heights are counted
-    return choose(good, Belief(pose, belief.cov), mind.belief)
+    pose = Pose(belief.pose.x, belief.pose.y, agent.belief.pose.z, belief.pose.yaw)  # heights are counted
+    return choose(good, Belief(pose, belief.cov), agent.belief)
 
 
-def by_walls(mind: AgentState, view: View, settings: MissionParams, program: MissionSpec) -> AgentState:
-    """The mind after the walls in view were matched to those measured before, and added to them."""
-    spec, image = program.spec, program.image
-    flat = jax.lax.optimization_barrier(level_view(view, mind.belief.pose.z, settings.mapping, spec))
+def by_walls(agent: AgentState, view: View, params: MissionParams, spec: MissionSpec) -> AgentState:
+    """The agent after the walls in view were matched to those measured before, and added to them."""
+    grid, image = spec.grid, spec.image
+    flat = jax.lax.optimization_barrier(level_view(view, agent.belief.pose.z, params.mapping, grid))
     shape, step = picture_shape(view.x.shape[-1], image.width, image.height)
-    walls = find_walls(flat, shape, step, mind.belief.pose.z)
-    belief = match(mind.belief, walls, mind.outlines, spec)
-    return replace(mind, belief=belief, outlines=add_walls(mind.outlines, walls, belief.pose, spec))
+    walls = find_walls(flat, shape, step, agent.belief.pose.z)
+    belief = match(agent.belief, walls, agent.outlines, grid)
+    return replace(agent, belief=belief, outlines=add_walls(agent.outlines, walls, belief.pose, grid))
 
 
 def choose(good: Bool[Array, ""], new: Belief, old: Belief) -> Belief:
@@ -69,31 +64,30 @@ def choose(good: Bool[Array, ""], new: Belief, old: Belief) -> Belief:
     return jax.tree.map(lambda a, b: jnp.where(good, a, b), new, old)
 
 
-def carried_on(mind: AgentState, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
-    """The mind after a command, by odometry."""
-    if mind.anchor is None:
-        return mind
-    return replace(mind, anchor=replace(mind.anchor, moved=moved, variances=variances))
+def carried_on(agent: AgentState, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
+    """The agent after a command, by odometry."""
+    if agent.anchor is None:
+        return agent
+    return replace(agent, anchor=replace(agent.anchor, moved=moved, variances=variances))
 
 
 def unmarked(
     view: View,
     world: WorldState,
-    mind: AgentState,
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
+    agent: AgentState,
+    setup: MissionSetup,
     seed: UInt32[Array, ""],
 ) -> Sightings:
     """The motion that a robot without landmarks measures, according to the ray-cast sensor.
 
     Deviation: for a simulated biped this is the motion of its feet, regardless of its body.
     """
-    zero = jnp.zeros_like(arena.landmarks.x)
+    params, image = setup.params, setup.spec.image
+    zero = jnp.zeros_like(setup.arena.landmarks.x)
     none = Sightings(zero, zero, zero, zero > 0)
-    if program.localisation not in VISUAL:
+    if setup.spec.localisation not in VISUAL:
         return none
-    at = mount(settings.camera, mind.anchor.look, mind.anchor.squat)
-    camera, reach = settings.camera, settings.stereo.max_range
-    motion = track(view, world.pose, world.before, at, camera, settings.visual, program.image, reach, seed)
-    return replace(none, motion=replace(motion, seen=motion.seen & mind.anchor.some))
+    at = mount(params.camera, agent.anchor.look, agent.anchor.squat)
+    camera, reach = params.camera, params.stereo.max_range
+    motion = track(view, world.pose, world.before, at, camera, params.visual, image, reach, seed)
+    return replace(none, motion=replace(motion, seen=motion.seen & agent.anchor.some))

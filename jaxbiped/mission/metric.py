@@ -31,7 +31,12 @@ class Step:
     after: Any  # `WorldState` after its action
     command: Any  # `Command` its command
     played: Bool[Array, "*B"]  # False: the mission ended with this decision, and the robot stayed
-    settings: Any  # `MissionParams` of the mission
+    params: Any  # `MissionParams` of the mission
+
+    @property
+    def settings(self) -> Any:
+        """`params` by its former name, which metrics may read."""
+        return self.params
 
 
 @jax.tree_util.register_dataclass
@@ -42,7 +47,12 @@ class MissionEnd:
     arena: Any  # `Arena`
     result: Any  # `Result`: its code, distance, time and so on
     plan: Any  # `OraclePlan`: whether a plan exists with perfect knowledge, its cost and its length
-    settings: Any  # `MissionParams`
+    params: Any  # `MissionParams`
+
+    @property
+    def settings(self) -> Any:
+        """`params` by its former name, which metrics may read."""
+        return self.params
 
 
 class MetricFormat(Model):
@@ -69,7 +79,7 @@ class Metric:
     smaller_is_better: ClassVar[bool] = True
     of_servos: ClassVar[bool] = False  # whether its state is the work [J] of a simulated biped, which its driver writes
 
-    def start(self, arena: Any, settings: Any) -> Any:
+    def start(self, arena: Any, params: Any) -> Any:
         """The state before the first decision in an `Arena`."""
         return ()
 
@@ -123,9 +133,9 @@ def column_of(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name.rpartition(":")[2]).lower() if ":" in name else name
 
 
-def begun(metrics: tuple[Metric, ...], arena: Any, settings: Any) -> tuple:
+def begun(metrics: tuple[Metric, ...], arena: Any, params: Any) -> tuple:
     """The state of each metric at the start of one mission."""
-    return tuple(jax.tree.map(jnp.asarray, metric.start(arena, settings)) for metric in metrics)
+    return tuple(jax.tree.map(jnp.asarray, metric.start(arena, params)) for metric in metrics)
 
 
 def updated(metrics: tuple[Metric, ...], states: tuple, step: Step) -> tuple:

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from jaxbiped.core.registry import METRICS
+from jaxbiped.executors.execution import CHECKS, TOUCH
 from jaxbiped.geometry.boxes import plan_distance
-from jaxbiped.mission.execution import CHECKS, TOUCH
 from jaxbiped.mission.metric import Metric, MissionEnd, Step
 from jaxbiped.mission.outcome import Code
 
@@ -48,20 +48,20 @@ class LeastClearance(Metric):
     unit, scale, digits = "cm", 100.0, 1
     smaller_is_better = False
 
-    def start(self, arena, settings) -> Float[Array, ""]:
+    def start(self, arena, params) -> Float[Array, ""]:
         """See `Metric`."""
         return jnp.full((), jnp.inf)
 
     def update(self, state: Float[Array, ""], step: Step) -> Float[Array, ""]:
         """See `Metric`."""
-        boxes, before, after, settings = step.arena.boxes, step.before.pose, step.after.pose, step.settings
-        head = jnp.where(step.command.squat, settings.body.squatting, settings.body.standing)
+        boxes, before, after, params = step.arena.boxes, step.before.pose, step.after.pose, step.params
+        head = jnp.where(step.command.squat, params.body.squatting, params.body.standing)
         foot = jnp.maximum(before.z, after.z)
-        there = (boxes.top > foot + settings.body.step + TOUCH) & (boxes.bottom < foot + head - TOUCH) & boxes.used
+        there = (boxes.top > foot + params.body.step + TOUCH) & (boxes.bottom < foot + head - TOUCH) & boxes.used
         for part in CHECKS:
             x, y = (start + part * (end - start) for start, end in ((before.x, after.x), (before.y, after.y)))
             gap = jnp.min(jnp.where(there, plan_distance(boxes, x, y), jnp.inf), initial=jnp.inf)
-            state = jnp.where(step.played, jnp.minimum(state, gap - settings.limits.body_radius), state)
+            state = jnp.where(step.played, jnp.minimum(state, gap - params.limits.body_radius), state)
         return state
 
     def result(self, state: Float[Array, ""], end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
@@ -91,7 +91,7 @@ class MeasuringShare(Metric):
 
     def result(self, state: tuple, end: MissionEnd) -> tuple[Float[Array, ""], Bool[Array, ""]]:
         """See `Metric`."""
-        spent = end.result.measurements * end.settings.durations.measure
+        spent = end.result.measurements * end.params.durations.measure
         some = end.result.time > 0
         return spent / jnp.where(some, end.result.time, 1.0), some
 
@@ -108,7 +108,7 @@ class Energy(Metric):
     unit, digits = "J", 1
     of_servos = True
 
-    def start(self, arena, settings) -> Float[Array, ""]:
+    def start(self, arena, params) -> Float[Array, ""]:
         """See `Metric`."""
         return jnp.full((), jnp.nan)
 

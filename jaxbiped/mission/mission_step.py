@@ -11,18 +11,20 @@ from jaxtyping import Array, Int
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.moving_boxes import at_time, only
+from jaxbiped.executors.execution import Execution, execution_of
+from jaxbiped.executors.moving_collisions import met
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.localisation.kalman_filter import predict
 from jaxbiped.mission.decision import DecisionTrace, climbed, decide
-from jaxbiped.mission.execution import Execution, execution_of
 from jaxbiped.mission.foot_placement import walked
 from jaxbiped.mission.localising import carried_on, unmarked
 from jaxbiped.mission.metric import Step, updated
-from jaxbiped.mission.moving_collisions import met
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionParams
 from jaxbiped.mission.sensors import Oracle, RayCast, Standpoint, view_of
-from jaxbiped.mission.settings import MissionParams, MissionSpec
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import landmarks
 from jaxbiped.sensing.counter_rng import fold
@@ -34,10 +36,8 @@ TRUSTED = (RayCast, Oracle, type(None))  # sensors whose numbers are finite
 
 def step(
     world: WorldState,
-    mind: AgentState,
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
+    agent: AgentState,
+    setup: MissionSetup,
     seen: tuple[View, Sightings] | None = None,
 ) -> tuple[WorldState, AgentState, View, Command, DecisionTrace]:
     """Advance every mission of the batch by one decision. Missions that have ended do not change.
@@ -47,110 +47,100 @@ def step(
     Args:
       seen: what each robot has just measured; None: measure here, with a sensor in JAX.
     """
-    view, thinking, command, verdict, thought = sense_and_decide(world, mind, arena, settings, program, seen=seen)
-    executed = carry_out(arena, world, command, settings, program)
-    after, moved = jax.vmap(apply_outcome, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
-        world, thinking, command, verdict, executed, arena, settings, program
-    )
+    view, thinking, command, verdict, thought = sense_and_decide(world, agent, setup, seen=seen)
+    executed = carry_out(world, command, setup)
+    after, moved = jax.vmap(apply_outcome)(world, thinking, command, verdict, executed, setup)
     running = world.code == Code.RUNNING
     after = jax.tree.map(lambda new, old: jnp.where(running.reshape(-1, *[1] * (new.ndim - 1)), new, old), after, world)
     return after, moved, view, command, thought
 
 
-def carry_out(
-    arena: Arena, world: WorldState, command: Command, settings: MissionParams, program: MissionSpec
-) -> Execution:
+def carry_out(world: WorldState, command: Command, setup: MissionSetup) -> Execution:
     """Execute the command of each robot, among standing and moving boxes."""
-    play = jax.vmap(played)
+    play, arena, params = jax.vmap(played), setup.arena, setup.params
     if arena.movers is None:
-        return play(arena, world, command, settings)
-    executed = play(jax.vmap(partial(only, moving=False))(arena), world, command, settings)
-    run_into = jax.vmap(met)(arena, world, command, executed, settings)
+        return play(arena, world, command, params)
+    executed = play(jax.vmap(partial(only, moving=False))(arena), world, command, params)
+    run_into = jax.vmap(met)(arena, world, command, executed, params)
     return replace(executed, collided=executed.collided | run_into, fell=executed.fell & ~run_into)
 
 
-def played(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
+def played(arena: Arena, world: WorldState, command: Command, params: MissionParams) -> Execution:
     """Execute the command of one robot."""
-    return execution_of(settings.executor, arena, world, command, settings)
+    return execution_of(params.executor, arena, world, command, params)
 
 
 def sense_and_decide(
     world: WorldState,
-    mind: AgentState,
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
-    carriage: BodyPose | None = None,
+    agent: AgentState,
+    setup: MissionSetup,
+    body_pose: BodyPose | None = None,
     seen: tuple[View, Sightings] | None = None,
 ) -> tuple[View, AgentState, Command, Int[Array, "B"], DecisionTrace]:
     """Sense and decide, for a batch: the view, and what `decide` returns. Consumes channel SENSE.
 
     Args:
-      carriage: [B] true pose of each robot's body; None: upright, except for a tilt drawn by the sensor.
+      body_pose: [B] true pose of each robot's body; None: upright, except for a tilt drawn by the sensor.
       seen: what each robot has just measured; None: measure here.
     """
     if seen is None:
-        now = arena if arena.movers is None else jax.vmap(at_time)(arena, world.time)
-        seen = jax.vmap(sense, in_axes=(0, 0, 0, 0, None, 0))(world, mind, now, settings, program, carriage)
+        arena = setup.arena
+        now = setup if arena.movers is None else replace(setup, arena=jax.vmap(at_time)(arena, world.time))
+        seen = jax.vmap(sense)(world, agent, now, body_pose)
     # Without the barrier, XLA fuses the camera into the map and repeats the measurement for each use of a point.
     view, sightings = jax.lax.optimization_barrier(seen)
-    if program.knows_pose:
-        mind = replace(mind, belief=replace(mind.belief, pose=world.pose))
+    if setup.spec.knows_pose:
+        agent = replace(agent, belief=replace(agent.belief, pose=world.pose))
     active = world.code == Code.RUNNING
-    if type(settings.sensor) in TRUSTED:
-        return view, *decide(mind, view, sightings, arena, settings, program, active)
+    if type(setup.params.sensor) in TRUSTED:
+        return view, *decide(agent, view, sightings, setup, active)
     broken = jnp.any(jnp.isnan(view.weight), axis=-1)
     view = replace(view, weight=jnp.where(broken[:, None], 0.0, view.weight))
-    mind, command, verdict, thought = decide(mind, view, sightings, arena, settings, program, active)
-    return view, mind, command, jnp.where(broken & active, Code.INVALID, verdict), thought
+    agent, command, verdict, thought = decide(agent, view, sightings, setup, active)
+    return view, agent, command, jnp.where(broken & active, Code.INVALID, verdict), thought
 
 
 def sense(
-    world: WorldState,
-    mind: AgentState,
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
-    carriage: BodyPose | None,
+    world: WorldState, agent: AgentState, setup: MissionSetup, body_pose: BodyPose | None
 ) -> tuple[View, Sightings]:
     """The measurement of one robot from its true position, and with the true pose of its body."""
-    pose = world.pose if carriage is None else carriage.pose
-    attitude = None if carriage is None else (carriage.roll, carriage.pitch)
+    arena, params, spec = setup.arena, setup.params, setup.spec
+    pose = world.pose if body_pose is None else body_pose.pose
+    attitude = None if body_pose is None else (body_pose.roll, body_pose.pitch)
     seed = fold(world.seed, SENSE, world.decisions)
-    if settings.sensor is None:
-        raise ValueError(f"the sensor {program.sensor} measures on the host: its missions must be given their views")
-    at = Standpoint(world.pose if program.knows_pose else pose, mind.look, world.squat, attitude, seed)
-    view = view_of(settings.sensor, arena, at, settings, program)
-    if program.localisation != "landmarks":
-        return view, unmarked(view, world, mind, arena, settings, program, seed)
+    if params.sensor is None:
+        raise ValueError(f"the sensor {spec.sensor} measures on the host: its missions must be given their views")
+    at = Standpoint(world.pose if spec.knows_pose else pose, agent.look, world.squat, attitude, seed)
+    view = view_of(params.sensor, arena, at, params, spec)
+    if spec.localisation != "landmarks":
+        return view, unmarked(view, world, agent, setup, seed)
     return view, landmarks.sight(
-        arena, pose, settings.camera, settings.landmarks, program.image, seed, mind.look, world.squat
+        arena, pose, params.camera, params.landmarks, spec.image, seed, agent.look, world.squat
     )
 
 
 def apply_outcome(
     world: WorldState,
-    mind: AgentState,
+    agent: AgentState,
     command: Command,
     verdict: Int[Array, ""],
     executed: Execution,
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
+    setup: MissionSetup,
 ) -> tuple[WorldState, AgentState]:
     """Update one mission after its command: the robot integrates its odometry, the referee checks."""
+    arena, params = setup.arena, setup.params
     stays = verdict != Code.RUNNING
-    belief = predict(mind.belief, *executed.moved, executed.variances)
-    belief = replace(belief, pose=climbed(belief.pose, command.rise, program.spec))
+    belief = predict(agent.belief, *executed.moved, executed.variances)
+    belief = replace(belief, pose=climbed(belief.pose, command.rise, setup.spec.grid))
     pose = jax.tree.map(lambda new, old: jnp.where(stays, old, new), executed.pose, world.pose)
     acted = jnp.where(stays, 0.0, executed.time)
-    time = world.time + settings.durations.measure + acted
+    time = world.time + params.durations.measure + acted
     decisions = world.decisions + 1
     away = jnp.hypot(arena.goal_xy[0] - pose.x, arena.goal_xy[1] - pose.y)
 
-    code = jnp.where(decisions >= settings.limits.max_decisions, Code.OUT_OF_STEPS, Code.RUNNING)
+    code = jnp.where(decisions >= params.limits.max_decisions, Code.OUT_OF_STEPS, Code.RUNNING)
     code = jnp.where(stays, verdict, code)
-    code = jnp.where(away <= settings.limits.goal_radius, Code.REACHED, code)
+    code = jnp.where(away <= params.limits.goal_radius, Code.REACHED, code)
     code = jnp.where(~stays & executed.outside, Code.OUT_OF_BOUNDS, code)
     code = jnp.where(~stays & executed.fell, Code.FELL, code)
     code = jnp.where(~stays & executed.collided, Code.COLLIDED, code)
@@ -169,10 +159,10 @@ def apply_outcome(
         pose_error=astray,
         yaw_error=jnp.abs(wrap_angle(belief.pose.yaw - pose.yaw)),
         before=None if world.before is None else world.pose,
-        planned=mind.planned,
+        planned=agent.planned,
     )
-    if settings.metrics:
-        step = Step(arena, world, after, command, ~stays, settings)
-        after = replace(after, metrics=updated(settings.metrics, world.metrics, step))
-    mind = carried_on(walked(mind, command, executed.moved, executed.variances), executed.moved, executed.variances)
-    return after, replace(mind, belief=belief, since=settings.durations.measure + acted)
+    if params.metrics:
+        step = Step(arena, world, after, command, ~stays, params)
+        after = replace(after, metrics=updated(params.metrics, world.metrics, step))
+    agent = carried_on(walked(agent, command, executed.moved, executed.variances), executed.moved, executed.variances)
+    return after, replace(agent, belief=belief, since=params.durations.measure + acted)

@@ -12,15 +12,17 @@ from jaxtyping import Array, Float, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.log import MissionLog, Picture
 from jaxbiped.mission.mission_step import step
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.mission.sensor_rig import SensorRig
-from jaxbiped.mission.settings import MissionParams, MissionSpec
-from jaxbiped.mission.snapshots import ground, marks, mind_pose, moment, nothing, outlines, pose_of, walk_of
-from jaxbiped.mission.state import AgentState, WorldState, start
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.snapshots import agent_pose, ground, marks, moment, nothing, outlines, pose_of, walk_of
+from jaxbiped.mission.state import AgentState, start
 from jaxbiped.motion.primitives import Command, Primitive
 
 NAMES = {
@@ -55,66 +57,61 @@ class Mission:
     log: MissionLog = field(repr=False)
 
 
-turn_once = ready_jit(step, static_argnames=("program",))
+turn_once = ready_jit(step)
 
 
-@ready_jit(static_argnames=("program",))
-def begin_once(arena: Arena, settings: MissionParams, seed: UInt32[Array, ""], program: MissionSpec):
-    """Arena and settings with a leading axis of 1, and world and mind before the first measurement."""
-    begun = start(arena, settings, seed, program.spec, program.localisation)
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], ((arena, settings), begun))
+@ready_jit
+def begin_once(setup: MissionSetup, seed: UInt32[Array, ""]):
+    """The setup with a leading axis of 1, and world and agent before the first measurement."""
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (setup, start(setup, seed)))
 
 
 @with_own_settings
 def run_logged(
-    arena: Arena,
-    settings: MissionParams,
+    setup: MissionSetup,
     seed: UInt32[Array, ""],
-    program: MissionSpec,
     on_decision: Callable[[Played], None] = lambda _: None,
     rig: SensorRig | None = None,
 ) -> Mission:
     """Run one mission (no batch axis) like the compiled driver, and keep what the robot saw and thought.
 
     Args:
-      rig: its sensor, if the program's sensor is not in JAX.
+      rig: its sensor, if the spec's sensor is not in JAX.
     """
-    recorder = Recorder(settings, program, on_decision, rig)
-    return recorder.mission(arena, run_bare(arena, settings, seed, program, rig, recorder))
+    recorder = Recorder(setup.params, setup.spec, on_decision, rig)
+    return recorder.mission(setup.arena, run_bare(setup, seed, rig, recorder))
 
 
 @with_own_settings
 def run_bare(
-    arena: Arena,
-    settings: MissionParams,
+    setup: MissionSetup,
     seed: UInt32[Array, ""],
-    program: MissionSpec,
     rig: SensorRig | None = None,
     recorder: Recorder | None = None,
 ) -> WorldState:
     """The end of one mission (no batch axis); its world has a leading axis of 1."""
-    batch, (world, mind) = begin_once(arena, settings, seed, program)
+    batch, (world, agent) = begin_once(setup, seed)
     while np.asarray(world.code)[0] == Code.RUNNING:
         before = world
-        seen = rig.see(world, mind, *batch) if rig else None
-        world, mind, _, command, thought = turn_once(world, mind, *batch, program, seen)
+        seen = rig.see(world, agent, batch) if rig else None
+        world, agent, _, command, thought = turn_once(world, agent, batch, seen)
         if recorder:
             recorder.decided(0, before, command, thought)
-            recorder.concluded(0, world, mind)
+            recorder.concluded(0, world, agent)
     return world
 
 
 class Recorder:
-    """Records what one mission saw and thought; worlds, minds and so on have a leading axis of 1."""
+    """Records what one mission saw and thought; worlds, agents and so on have a leading axis of 1."""
 
     def __init__(
         self,
-        settings: MissionParams,
-        program: MissionSpec,
+        params: MissionParams,
+        spec: MissionSpec,
         on_decision: Callable[[Played], None],
         rig: SensorRig | None = None,
     ):
-        self.settings, self.program, self.on_decision, self.rig = settings, program, on_decision, rig
+        self.params, self.spec, self.on_decision, self.rig = params, spec, on_decision, rig
         self.moments: list[dict] = []
         self.pictures: list[Picture] = []
         self.played: list[Played] = []
@@ -124,7 +121,7 @@ class Recorder:
 
     def decided(self, _: int, world: WorldState, command: Command, thought: DecisionTrace) -> None:
         """Record one decision, before it is executed."""
-        self.moments.append(moment(world, thought, self.settings, self.program, self.action))
+        self.moments.append(moment(world, thought, self.params, self.spec, self.action))
         if shot := self.rig and self.rig.picture():
             self.pictures.append(Picture(shot.left, shot.disparity))
         self.command = command
@@ -135,7 +132,7 @@ class Recorder:
         if self.walked:
             self.walked[-1].append(qpos.astype(np.float32))
 
-    def concluded(self, _: int, world: WorldState, mind: AgentState) -> None:
+    def concluded(self, _: int, world: WorldState, agent: AgentState) -> None:
         """Record the outcome."""
         command, world = jax.device_get((self.command, world))
         record = Played(
@@ -147,7 +144,7 @@ class Recorder:
         self.played.append(record)
         self.on_decision(record)
         self.action = record.name if record.length or not record.turn else "Turn-direction"
-        self.end, self.mind = world, mind
+        self.end, self.agent = world, agent
 
     def mission(self, arena: Arena, world: WorldState) -> Mission:
         """The complete mission.
@@ -159,11 +156,11 @@ class Recorder:
         if moments:
             last = dict(moments[-1])
             here, time = pose_of(world), float(world.time[0])
-            last |= {"true_xyyaw": here, "estimated_xyyaw": mind_pose(self.mind), "time": time, "action": self.action}
+            last |= {"true_xyyaw": here, "estimated_xyyaw": agent_pose(self.agent), "time": time, "action": self.action}
             last |= {"z": float(world.pose.z[0]), "squat": bool(world.squat[0]), "plan": np.zeros((0, 2))}
             moments.append(last)
         else:
-            moments.append(nothing(world, self.program))
+            moments.append(nothing(world, self.spec))
         code = Code(int(world.code[0]))
         log = MissionLog(
             classes=np.stack([m["classes"] for m in moments]),
@@ -173,7 +170,7 @@ class Recorder:
             plan=tuple(m["plan"] for m in moments),
             time=np.array([m["time"] for m in moments]),
             action=tuple(m["action"] for m in moments),
-            pitch=self.program.spec.pitch,
+            pitch=self.spec.grid.pitch,
             origin_xy=np.zeros(2),
             size_xy=np.asarray(arena.size_xy, float),
             goal_xy=np.asarray(arena.goal_xy, float),
@@ -187,7 +184,7 @@ class Recorder:
             seen=np.array([m["seen"] for m in moments]),
             points=tuple(m["points"] for m in moments),
             voxels=np.stack([m["voxels"] for m in moments]),
-            level_height=self.program.spec.level_height,
+            level_height=self.spec.grid.level_height,
             walk=walk_of(self.walked),
         )
         played = tuple(self.played)

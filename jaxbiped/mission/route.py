@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from jaxbiped import planning
-from jaxbiped.mission.settings import MissionParams, MissionSpec
+from jaxbiped.geometry.pose import wrap_angle
+from jaxbiped.mission.params import MissionParams, MissionSpec
 from jaxbiped.motion.edge_approach import foresight
+from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.selection import stride
 from jaxbiped.planning.edge_clearance import rim_costs
 from jaxbiped.planning.planners import Problem
 
 
 def pose_problem(
-    classes: Int[Array, "B H W"],
-    levels: Int[Array, "B H W"],
+    local: LocalMap,
     goal_ij: Int[Array, "B 2"],
-    ij: Int[Array, "B 2"],
-    heading: Int[Array, "B"],
-    yaw: Float[Array, "B"],
-    settings: MissionParams,
-    program: MissionSpec,
+    params: MissionParams,
+    spec: MissionSpec,
     active: Bool[Array, "B"] | None = None,
     state=None,
 ) -> Problem:
@@ -30,39 +29,45 @@ def pose_problem(
     Robots whose feet are placed keep away from edges beside their path: see `planning.edge_clearance` for the cost.
 
     Args:
-      heading: the direction nearest to `yaw` [rad].
+      local: [B]
       active: robots whose answer is used; by default all.
       state: of the planners.
     """
-    spec = program.spec
-    length = max(stride(spec), foresight(spec)) if program.footing else stride(spec)
+    grid, yaw = spec.grid, local.pose.yaw
+    length = max(stride(grid), foresight(grid)) if spec.footing else stride(grid)
     return Problem(
-        classes=classes,
-        levels=levels,
-        start_ij=ij,
+        classes=local.classes,
+        levels=local.levels,
+        start_ij=local.ij,
         goal_ij=goal_ij,
-        heading=heading,
+        heading=jax.vmap(nearest_direction)(yaw),
         yaw=yaw,
-        costs=settings.costs.at_pitch(spec.pitch),
-        rules=settings.strategy.rules(),
-        times=times_of(settings),
-        unit_seconds=seconds_of_a_unit(settings),
-        surcharge=rim_costs(classes, levels, spec.pitch) if program.footing else None,
-        active=jnp.ones(ij.shape[0], bool) if active is None else active,
+        costs=params.costs.at_pitch(grid.pitch),
+        rules=params.strategy.rules(),
+        times=times_of(params),
+        unit_seconds=seconds_of_a_unit(params),
+        surcharge=rim_costs(local.classes, local.levels, grid.pitch) if spec.footing else None,
+        active=jnp.ones(goal_ij.shape[0], bool) if active is None else active,
         state=state,
-        pitch=spec.pitch,
+        pitch=grid.pitch,
         length=length,
     )
 
 
-def seconds_of_a_unit(settings: MissionParams) -> Float[Array, "*B"]:
+def nearest_direction(yaw: Float[Array, ""]) -> Int[Array, ""]:
+    """Index into DIRECTIONS of the move closest to a yaw [rad]."""
+    moves = jnp.asarray(planning.DIRECTIONS, jnp.float32)
+    return jnp.argmin(jnp.abs(wrap_angle(jnp.arctan2(moves[:, 0], moves[:, 1]) - yaw))).astype(jnp.int32)
+
+
+def seconds_of_a_unit(params: MissionParams) -> Float[Array, "*B"]:
     """Duration [s] of one unit of Eq. 1, from a straight move on the floor: 8 s for the paper's costs and times."""
-    return settings.durations.straight / (settings.costs.c0 + settings.costs.c1)
+    return params.durations.straight / (params.costs.c0 + params.costs.c1)
 
 
-def times_of(settings: MissionParams) -> planning.Times:
+def times_of(params: MissionParams) -> planning.Times:
     """The durations of a mission's clock, and C4 in seconds."""
-    d = settings.durations
+    d = params.durations
     return planning.Times(
         straight=d.straight,
         turn=d.turn,
@@ -70,5 +75,5 @@ def times_of(settings: MissionParams) -> planning.Times:
         step_down=d.step_down,
         pass_gate=d.pass_gate,
         measure=d.measure,
-        unmeasured=seconds_of_a_unit(settings) * settings.costs.c4,
+        unmeasured=seconds_of_a_unit(params) * params.costs.c4,
     )

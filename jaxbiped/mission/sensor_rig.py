@@ -10,12 +10,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
-from jaxbiped.arenas.arena import Arena
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.config import RENDERED as RENDERED
 from jaxbiped.mission.mission_step import SENSE
-from jaxbiped.mission.settings import VISUAL, MissionConfig, MissionParams
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.mission.params import VISUAL, MissionConfig, MissionParams
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import AgentState
 from jaxbiped.sensing.camera import Mount, mount, placed
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.counter_rng import fold
@@ -31,16 +32,15 @@ class SensorRig(Protocol):
     def see(
         self,
         world: WorldState,
-        mind: AgentState,
-        arena: Arena,
-        settings: MissionParams,
-        carriage: BodyPose | None = None,
+        agent: AgentState,
+        setup: MissionSetup,
+        body_pose: BodyPose | None = None,
         count: int | None = None,
     ) -> tuple[View, Sightings]:
         """The measurement of each robot of a batch, as in `mission_step.sense`: the same places, attitudes and seeds.
 
         Args:
-          carriage: [B] true pose of each robot's body; None: upright, except for a random tilt.
+          body_pose: [B] true pose of each robot's body; None: upright, except for a random tilt.
           count: rows from this one on are padding, and may get any value.
         """
         ...
@@ -74,18 +74,18 @@ class StereoRig:
     def see(
         self,
         world: WorldState,
-        mind: AgentState,
-        arena: Arena,
-        settings: MissionParams,
-        carriage: BodyPose | None = None,
+        agent: AgentState,
+        setup: MissionSetup,
+        body_pose: BodyPose | None = None,
         count: int | None = None,
     ) -> tuple[View, Sightings]:
         """See `SensorRig`; padding gets the values of the last row before it."""
-        placing = jax.device_get((where(world, mind, settings, carriage), mind.belief.pose, settings.stereo.max_range))
-        arena, spread = jax.device_get((arena, settings.landmarks))
+        params = setup.params
+        placing = jax.device_get((where(world, agent, params, body_pose), agent.belief.pose, params.stereo.max_range))
+        arena, spread = jax.device_get((setup.arena, params.landmarks))
         if not self.marked:
             arena = replace(arena, landmarks=replace(arena.landmarks, used=np.zeros_like(arena.landmarks.used)))
-        names, moved = jax.device_get((view_names(world, mind), mind.anchor.moved)) if self.tracker else (None, None)
+        names, moved = jax.device_get((view_names(world, agent), agent.anchor.moved)) if self.tracker else (None, None)
         seen = []
         for k in range(count or len(world.code)):
             one, spread_one, (eye, believed, max_range) = jax.tree.map(lambda v, k=k: v[k], (arena, spread, placing))
@@ -124,7 +124,7 @@ def try_rig(config: MissionConfig) -> None:
 
 
 @jax.jit
-def view_names(world: WorldState, mind: AgentState) -> tuple[UInt32[Array, "B 6"], UInt32[Array, "B 6"]]:
+def view_names(world: WorldState, agent: AgentState) -> tuple[UInt32[Array, "B 6"], UInt32[Array, "B 6"]]:
     """Identifiers of this view of each robot within its arena, and of the view before it; zeros before the first. Views
     of two missions with the same identifier are the same."""
 
@@ -133,26 +133,26 @@ def view_names(world: WorldState, mind: AgentState) -> tuple[UInt32[Array, "B 6"
         place = jax.lax.bitcast_convert_type(jnp.stack([pose.x, pose.y, pose.yaw]).astype(jnp.float32), jnp.uint32)
         return jnp.concatenate([place, jnp.stack([decision.astype(jnp.uint32), held, seed])])
 
-    def one(world: WorldState, mind: AgentState):
-        anchor = mind.anchor
+    def one(world: WorldState, agent: AgentState):
+        anchor = agent.anchor
         then = name(world.before, world.decisions - 1, anchor.look, anchor.squat, world.seed)
-        now = name(world.pose, world.decisions, mind.look, world.squat, world.seed)
+        now = name(world.pose, world.decisions, agent.look, world.squat, world.seed)
         return now, jnp.where(anchor.some, then, jnp.uint32(0))
 
-    return jax.vmap(one)(world, mind)
+    return jax.vmap(one)(world, agent)
 
 
 @jax.jit
 def where(
-    world: WorldState, mind: AgentState, settings: MissionParams, carriage: BodyPose | None
+    world: WorldState, agent: AgentState, params: MissionParams, body_pose: BodyPose | None
 ) -> tuple[Float[Array, "B 3"], Float[Array, "B 3 3"], Mount, UInt32[Array, "B"]]:
     """Each robot's true left camera: its centre [m] and its axes; its believed position; the view's seed."""
 
-    def one(world, mind, settings, carriage):
+    def one(world, agent, params, body_pose):
         seed = fold(world.seed, SENSE, world.decisions)
-        at = mount(settings.camera, mind.look, world.squat)
-        if carriage is None:
-            return *placed(world.pose, at, *attitude_error(settings.stereo, seed)), at, seed
-        return *placed(carriage.pose, at, carriage.roll, carriage.pitch), at, seed
+        at = mount(params.camera, agent.look, world.squat)
+        if body_pose is None:
+            return *placed(world.pose, at, *attitude_error(params.stereo, seed)), at, seed
+        return *placed(body_pose.pose, at, body_pose.roll, body_pose.pitch), at, seed
 
-    return jax.vmap(one)(world, mind, settings, carriage)
+    return jax.vmap(one)(world, agent, params, body_pose)

@@ -42,12 +42,12 @@ class Sensor:
     on_terrain: ClassVar[bool] = False  # whether it supports arenas with terrain
     is_picture: ClassVar[bool] = False  # whether its points are those of the camera's rays, row by row
 
-    def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+    def measure(self, arena: Any, at: Standpoint, params: Any, spec: Any) -> View:
         """Points in the robot frame of one `Arena`.
 
         Args:
-          settings: `settings.camera`, `settings.stereo` and so on, traced.
-          program: static values: `program.image` (the camera's rays), `program.spec` (the grid).
+          params: `params.camera`, `params.stereo` and so on, traced.
+          spec: static values: `spec.image` (the camera's rays), `spec.grid` (the map).
 
         Numbers that are not finite end the mission as `invalid`.
         """
@@ -61,11 +61,11 @@ class RayCast(Sensor):
 
     on_terrain, is_picture = True, True
 
-    def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+    def measure(self, arena: Any, at: Standpoint, params: Any, spec: Any) -> View:
         """See `Sensor`."""
-        camera, stereo = settings.camera, settings.stereo
+        camera, stereo = params.camera, params.stereo
         return raycast.measure(
-            arena, at.pose, camera, stereo, program.image, at.seed, at.looks_down, at.squat, at.attitude
+            arena, at.pose, camera, stereo, spec.image, at.seed, at.looks_down, at.squat, at.attitude
         )
 
 
@@ -76,10 +76,10 @@ class Oracle(Sensor):
 
     knows_pose, on_terrain = True, True
 
-    def measure(self, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+    def measure(self, arena: Any, at: Standpoint, params: Any, spec: Any) -> View:
         """See `Sensor`."""
-        area = (program.spec.size_x, program.spec.size_y)
-        spacing, levels = min(ORACLE_SPACING, program.spec.pitch), program.spec.levels + program.spec.lowest
+        area = (spec.grid.size_x, spec.grid.size_y)
+        spacing, levels = min(ORACLE_SPACING, spec.grid.pitch), spec.grid.levels + spec.grid.lowest
         return oracle.measure(arena, at.pose, area, spacing=spacing, levels=levels, weight=ORACLE_WEIGHT)
 
 
@@ -101,13 +101,13 @@ def find_sensor(name: str) -> Sensor | None:
     )
 
 
-def view_of(sensor: Sensor, arena: Any, at: Standpoint, settings: Any, program: Any) -> View:
+def view_of(sensor: Sensor, arena: Any, at: Standpoint, params: Any, spec: Any) -> View:
     """A sensor's measurement, checked if it is not built in; values that are not finite make all weights NaN.
 
     Raises:
       InputError: a result that is not the view of one robot.
     """
-    view = sensor.measure(arena, at, settings, program)
+    view = sensor.measure(arena, at, params, spec)
     if type(sensor) in (RayCast, Oracle):
         return view
     where = f"sensor {type(sensor).__name__}"

@@ -19,23 +19,26 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped import physics
-from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import refuse_terrain
 from jaxbiped.biped.gait import TIMESTEP
 from jaxbiped.biped.model import robot_spec
 from jaxbiped.errors import InputError
+from jaxbiped.executors.config import WalkConfig
+from jaxbiped.executors.primitive_schedule import FURTHEST_CLIMB, Move, requests, targets
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import GridSpec
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, ending, no_results, tally
 from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.primitive_schedule import FURTHEST_CLIMB, Move, WalkConfig, requests, targets
+from jaxbiped.mission.params import SIMULATED, MissionConfig
 from jaxbiped.mission.recorded_driver import Mission, Played, Recorder
 from jaxbiped.mission.sensor_rig import SensorRig
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.simulated_step import (
     Plan,
+    PlanEnd,
     choose_rows,
     decide_next,
     fresh,
@@ -46,7 +49,7 @@ from jaxbiped.mission.simulated_step import (
     scatter,
 )
 from jaxbiped.mission.stage import Stage
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState, start
+from jaxbiped.mission.state import AgentState, start
 from jaxbiped.motion.grid_units import CELL
 from jaxbiped.motion.primitives import Command, Primitive
 
@@ -63,28 +66,26 @@ class Observer(Protocol):
 
     def decided(self, job: int, world: WorldState, command: Command, thought: DecisionTrace, /) -> None: ...
 
-    def concluded(self, job: int, world: WorldState, mind: AgentState, /) -> None: ...
+    def concluded(self, job: int, world: WorldState, agent: AgentState, /) -> None: ...
 
     def moved(self, job: int, qpos: Float[np.ndarray, "nq"], /) -> None: ...
 
 
 @with_own_settings
 def walk(
-    arenas: Arena,
-    settings: MissionParams,
+    setup: MissionSetup,
     jobs: Jobs,
-    program: MissionSpec,
     config: WalkConfig,
     on_progress: OnProgress = lambda tally: None,
     observer: Observer | None = None,
     rig: SensorRig | None = None,
 ) -> Result:
-    """Process a queue of missions; `program.executor` names the physics.
+    """Process a queue of missions; the executor of the spec names the physics.
 
     Args:
-      arenas: leading axis [A]; settings: leading axis [P]; jobs: [N].
+      setup: arenas with the leading axis [A] and parameters with [P], which the jobs [N] combine.
       on_progress: called with the tally of the jobs.
-      rig: the robots' sensor, if the program's sensor is not in JAX.
+      rig: the robots' sensor, if the spec's sensor is not in JAX.
 
     Returns:
       Results in the order of the jobs, on the host; padding stays RUNNING.
@@ -92,30 +93,25 @@ def walk(
     Raises:
       InputError: a missing device, a biped that cannot play its primitives, or arenas with terrain.
     """
-    refuse_terrain(arenas, f"executor {program.executor}")
-    return Walkers(arenas, settings, jobs, program, config, observer, rig).work(on_progress)
+    refuse_terrain(setup.arena, f"executor {setup.spec.executor}")
+    return Walkers(setup, jobs, config, observer, rig).work(on_progress)
 
 
 @with_own_settings
 def walk_logged(
-    arena: Arena,
-    settings: MissionParams,
+    setup: MissionSetup,
     seed: UInt32[Array, ""],
-    program: MissionSpec,
     config: WalkConfig,
     on_decision: Callable[[Played], None] = lambda _: None,
     rig: SensorRig | None = None,
 ) -> Mission:
     """One mission of a simulated biped, with a log of everything, like `recorded_driver.run_logged`."""
-    arenas, points, world = jax.tree.map(
-        lambda leaf: jnp.asarray(leaf)[None],
-        (arena, settings, start(arena, settings, seed, program.spec, program.localisation)[0]),
-    )
+    batch, world = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (setup, start(setup, seed)[0]))
     zero = jnp.zeros(1, jnp.int32)
-    recorder = Recorder(settings, program, on_decision, rig)
+    recorder = Recorder(setup.params, setup.spec, on_decision, rig)
     jobs = Jobs(zero, zero, jnp.asarray(seed)[None], jnp.int32(1))
-    walk(arenas, points, jobs, program, config, observer=recorder, rig=rig)
-    return recorder.mission(arena, world)
+    walk(batch, jobs, config, observer=recorder, rig=rig)
+    return recorder.mission(setup.arena, world)
 
 
 def rehearse(config: MissionConfig) -> None:
@@ -144,22 +140,22 @@ def rehearse(config: MissionConfig) -> None:
 class Walkers:
     """The slots, and the queue that they process."""
 
-    def __init__(self, arenas, settings, jobs, program: MissionSpec, config: WalkConfig, observer=None, rig=None):
-        self.arenas, self.settings, self.jobs = arenas, settings, jobs
-        self.program, self.config, self.observer, self.rig = program, config, observer, rig
+    def __init__(self, setup: MissionSetup, jobs: Jobs, config: WalkConfig, observer=None, rig=None):
+        arenas, params, physics_name = setup.arena, setup.params, setup.spec.executor
+        self.setup, self.jobs, self.config, self.observer, self.rig = setup, jobs, config, observer, rig
         self.arena_of, self.point_of = np.asarray(jobs.arena), np.asarray(jobs.point)
         self.count = int(jobs.count)
-        self.step, self.rise = np.asarray(settings.body.step), np.asarray(settings.limits.rise)
+        self.step, self.rise = np.asarray(params.body.step), np.asarray(params.limits.rise)
         size = max(1, min(config.slots, self.count))
-        options = config.options(program.executor) | {"work": any(metric.of_servos for metric in settings.metrics)}
-        self.stage = Stage(program.executor, size, jax.device_get(arenas.boxes), config.biped, **options)
+        options = config.options(physics_name) | {"work": any(metric.of_servos for metric in params.metrics)}
+        self.stage = Stage(physics_name, size, jax.device_get(arenas.boxes), config.biped, **options)
         self.job, self.next_job = np.arange(size), size
         self.squat = np.zeros(size, bool)
         self.tapes = [self.stage.rest(False)] * size
         self.place, self.length = np.zeros((2, size), int)  # position on the tape; beyond its end the last row is held
         jobs_in_all = len(self.arena_of)
         self.goals = np.asarray(arenas.goal_xy)
-        self.world, self.mind = fresh(arenas, settings, jobs, jnp.asarray(self.job), program)
+        self.world, self.agent = fresh(setup, jobs, jnp.asarray(self.job))
         self.result = no_results(jobs_in_all, metrics=jax.tree.map(lambda leaf: leaf[0], self.world.metrics))
         self.result.code[:] = Code.RUNNING
         self.plan = no_plan(size)
@@ -195,23 +191,23 @@ class Walkers:
         stands = self.stage.stands(ids, self.squat[ids])
         rows = np.resize(ids, ROWS)
         feet, body = (jnp.asarray(np.resize(v, (ROWS, v.shape[1])).T, jnp.float32) for v in (stands.feet, stands.body))
-        carriage = BodyPose(Pose(*body[:4]), body[4], body[5])
-        world, mind, plan = gather((self.world, self.mind, self.plan), rows)
-        arena = gather(self.arenas, self.arena_of[self.job[rows]])
-        setting = gather(self.settings, self.point_of[self.job[rows]])
-        ends = self.stage.fell[rows], self.stage.collided[rows]
-        done = world, mind, plan, Pose(*feet)
+        body_pose = BodyPose(Pose(*body[:4]), body[4], body[5])
+        world, agent, plan = gather((self.world, self.agent, self.plan), rows)
+        setup = replace(
+            self.setup,
+            arena=gather(self.setup.arena, self.arena_of[self.job[rows]]),
+            params=gather(self.setup.params, self.point_of[self.job[rows]]),
+        )
+        done = world, agent, plan, PlanEnd(Pose(*feet), self.stage.fell[rows], self.stage.collided[rows])
         if self.rig:
-            world, moved, times = judge(*done, *ends, arena, setting, self.program)
-            seen = self.rig.see(world, moved, arena, setting, carriage, len(ids))
-            mind, following, thought = decide_next(world, moved, times, carriage, arena, setting, self.program, seen)
+            world, moved, times = judge(*done, setup)
+            seen = self.rig.see(world, moved, setup, body_pose, len(ids))
+            agent, following, thought = decide_next(world, moved, times, body_pose, setup, seen)
         else:
-            world, moved, mind, following, thought = judge_and_decide(
-                *done, carriage, *ends, arena, setting, self.program
-            )
+            world, moved, agent, following, thought = judge_and_decide(*done, body_pose, setup)
         mine = np.where(np.arange(ROWS) < len(ids), rows, len(self.job))
-        slots = self.world, self.mind, self.plan
-        self.world, self.mind, self.plan = scatter(slots, mine, (world, mind, following))
+        slots = self.world, self.agent, self.plan
+        self.world, self.agent, self.plan = scatter(slots, mine, (world, agent, following))
         if self.observer:
             self.tell(ids, plan, world, moved, following, thought)
         world, command, verdict = jax.device_get((world, following.command, following.verdict))
@@ -252,7 +248,7 @@ class Walkers:
         """Record how the mission of a slot ended."""
         job = self.job[s]
         worked = np.float32(self.stage.work[s])
-        metrics = zip(self.settings.metrics, world.metrics, strict=True)
+        metrics = zip(self.setup.params.metrics, world.metrics, strict=True)
         world = replace(world, metrics=tuple(worked if metric.of_servos else state for metric, state in metrics))
         last = ending(world, self.goals[self.arena_of[job]])
         for column, value in zip(jax.tree.leaves(self.result), jax.tree.leaves(last), strict=True):
@@ -262,9 +258,9 @@ class Walkers:
         """Give the slots of a mask the next jobs, or none if there are no more."""
         self.job[ended] = self.next_job + np.arange(ended.sum())
         self.next_job += int(ended.sum())
-        begun = fresh(self.arenas, self.settings, self.jobs, jnp.asarray(self.job), self.program)
+        begun = fresh(self.setup, self.jobs, jnp.asarray(self.job))
         none = no_plan(len(ended))
-        self.world, self.mind, self.plan = choose_rows(ended, (*begun, none), (self.world, self.mind, self.plan))
+        self.world, self.agent, self.plan = choose_rows(ended, (*begun, none), (self.world, self.agent, self.plan))
         self.enter(ended)
 
     def enter(self, mask: Bool[np.ndarray, "S"]) -> None:

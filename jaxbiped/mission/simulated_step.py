@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
 
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxbiped.arenas.arena import Arena
+from jaxbiped.executors.execution import ODOMETRY, Execution
+from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mission.batched_driver import Jobs, begin, pick
 from jaxbiped.mission.decision import DecisionTrace
-from jaxbiped.mission.executors import ODOMETRY, Execution
 from jaxbiped.mission.mission_step import apply_outcome, sense_and_decide
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionParams, MissionSpec
-from jaxbiped.mission.state import AgentState, BodyPose, WorldState
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.sensing.counter_rng import fold
@@ -40,6 +39,16 @@ class Plan:
     verdict: Int[Array, "*B"]
     some: Bool[Array, "*B"]  # False before the first decision
     hindered: Int[Array, "*B"]  # number of successive hindered commands before this one
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class PlanEnd:
+    """How an action ended, according to the engine."""
+
+    pose: Pose  # of the midpoint of the soles
+    fell: Bool[Array, "*B"]
+    collided: Bool[Array, "*B"]
 
 
 def no_plan(size: int) -> Plan:
@@ -66,47 +75,37 @@ def choose_rows(mask: Bool[Array, "S"], new, old):
     return jax.tree.map(lambda a, b: jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b), new, old)
 
 
-@partial(jax.jit, static_argnames=("program",))
-def fresh(
-    arenas: Arena, settings: MissionParams, jobs: Jobs, job: Int[Array, "S"], program: MissionSpec
-) -> tuple[WorldState, AgentState]:
+@jax.jit
+def fresh(setup: MissionSetup, jobs: Jobs, job: Int[Array, "S"]) -> tuple[WorldState, AgentState]:
     """See `batched_driver.begin`."""
-    return begin(arenas, settings, jobs, job, program)
+    return begin(setup, jobs, job)
 
 
-@partial(jax.jit, static_argnames=("program",))
+@jax.jit
 def judge_and_decide(
     world: WorldState,
-    mind: AgentState,
+    agent: AgentState,
     plan: Plan,
-    after: Pose,
-    carriage: BodyPose,
-    fell: Bool[Array, "n"],
-    collided: Bool[Array, "n"],
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
+    ending: PlanEnd,
+    body_pose: BodyPose,
+    setup: MissionSetup,
 ) -> tuple[WorldState, AgentState, AgentState, Plan, DecisionTrace]:
     """The referee judges each robot's last plan, and each robot makes its next one.
 
     Returns:
-      The world and the mind after the action; the mind after the next measurement; the next plan; the trace.
+      The world and the agent after the action; the agent after the next measurement; the next plan; the trace.
     """
-    world, mind, times = judge(world, mind, plan, after, fell, collided, arena, settings, program)
-    return world, mind, *decide_next(world, mind, times, carriage, arena, settings, program)
+    world, agent, times = judge(world, agent, plan, ending, setup)
+    return world, agent, *decide_next(world, agent, times, body_pose, setup)
 
 
-@partial(jax.jit, static_argnames=("program",))
+@jax.jit
 def judge(
     world: WorldState,
-    mind: AgentState,
+    agent: AgentState,
     plan: Plan,
-    after: Pose,
-    fell: Bool[Array, "n"],
-    collided: Bool[Array, "n"],
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
+    ending: PlanEnd,
+    setup: MissionSetup,
 ) -> tuple[WorldState, AgentState, Int[Array, "n"]]:
     """The referee judges the outcome of each robot's plan.
 
@@ -114,35 +113,31 @@ def judge(
     edge that the map has elsewhere, make the robot step back and plan around that cell.
 
     Returns:
-      The world and the mind after the action; how many successive commands were hindered.
+      The world and the agent after the action; how many successive commands were hindered.
     """
-    executed = jax.vmap(execute)(world, plan.command, after, fell, collided, arena, settings)
-    done = jax.vmap(apply_outcome, in_axes=(0, 0, 0, 0, 0, 0, 0, None))(
-        world, mind, plan.command, plan.verdict, executed, arena, settings, program
-    )
+    executed = jax.vmap(execute)(world, plan.command, ending, setup)
+    done = jax.vmap(apply_outcome)(world, agent, plan.command, plan.verdict, executed, setup)
     times = jnp.where(plan.some & hindered(plan.command, executed.moved), plan.hindered + 1, 0)
-    felt = jax.vmap(feel, in_axes=(0, 0, 0, None))(done[1], mind.belief.pose, plan.command, program.spec)
+    felt = jax.vmap(feel, in_axes=(0, 0, 0, None))(done[1], agent.belief.pose, plan.command, setup.spec.grid)
     done = done[0], choose_rows(times >= PATIENCE, felt, done[1])
-    return *choose_rows(plan.some, done, (world, mind)), times
+    return *choose_rows(plan.some, done, (world, agent)), times
 
 
-@partial(jax.jit, static_argnames=("program",))
+@jax.jit
 def decide_next(
     world: WorldState,
-    mind: AgentState,
+    agent: AgentState,
     times: Int[Array, "n"],
-    carriage: BodyPose,
-    arena: Arena,
-    settings: MissionParams,
-    program: MissionSpec,
+    body_pose: BodyPose,
+    setup: MissionSetup,
     seen: tuple[View, Sightings] | None = None,
 ) -> tuple[AgentState, Plan, DecisionTrace]:
     """Each robot measures, or has `seen`, and makes its next plan; `times` is the count returned by `judge`.
 
     Returns:
-      The mind after the measurement; the plan; the trace.
+      The agent after the measurement; the plan; the trace.
     """
-    _, thinking, command, verdict, thought = sense_and_decide(world, mind, arena, settings, program, carriage, seen)
+    _, thinking, command, verdict, thought = sense_and_decide(world, agent, setup, body_pose, seen)
     stuck = times >= PATIENCE
     command = choose_rows(stuck & (verdict == Code.RUNNING), back_off(command), command)
     return thinking, Plan(command, verdict, jnp.ones_like(stuck), jnp.where(stuck, 0, times)), thought
@@ -160,19 +155,19 @@ def hindered(command: Command, moved: Float[Array, "n 3"]) -> Bool[Array, "n"]:
     return ((off > HINDERED) | (astray > TWISTED)) & (command.rise == 0) & (command.length >= 0)
 
 
-def feel(mind: AgentState, before: Pose, command: Command, spec: GridSpec) -> AgentState:
+def feel(agent: AgentState, before: Pose, command: Command, grid: GridSpec) -> AgentState:
     """Write an obstacle into the map of one robot, at the cell where hindered feet should have ended.
 
     If it stands in that cell, the cell behind it is used.
     """
     yaw = before.yaw + command.turn
     ahead = Pose(before.x, before.y, before.z, yaw)
-    own = cell_of(mind.belief.pose.x, mind.belief.pose.y, spec)
-    there = cell_of(*to_world(ahead, command.length, command.left), spec)
-    beyond = cell_of(*to_world(ahead, command.length + spec.pitch, command.left), spec)
+    own = cell_of(agent.belief.pose.x, agent.belief.pose.y, grid)
+    there = cell_of(*to_world(ahead, command.length, command.left), grid)
+    beyond = cell_of(*to_world(ahead, command.length + grid.pitch, command.left), grid)
     i, j = jnp.where(jnp.all(there == own), beyond, there)
-    votes = mind.grid_map.votes.at[i, j, Cell.OBSTACLE - 1].add(TOUCH_VOTES)
-    return replace(mind, grid_map=replace(mind.grid_map, votes=votes))
+    votes = agent.grid_map.votes.at[i, j, Cell.OBSTACLE - 1].add(TOUCH_VOTES)
+    return replace(agent, grid_map=replace(agent.grid_map, votes=votes))
 
 
 def back_off(command: Command) -> Command:
@@ -188,31 +183,24 @@ def back_off(command: Command) -> Command:
     )
 
 
-def execute(
-    world: WorldState,
-    command: Command,
-    after: Pose,
-    fell: Bool[Array, ""],
-    collided: Bool[Array, ""],
-    arena: Arena,
-    settings: MissionParams,
-) -> Execution:
+def execute(world: WorldState, command: Command, ending: PlanEnd, setup: MissionSetup) -> Execution:
     """The outcome of a command, from the robot's pose afterwards according to the engine.
 
     Odometry counts the true displacement with the noise of every executor, since joints and feet can measure that.
     Time is Table 2's, distance the true one. Consumes channel ODOMETRY of the mission's seed.
     """
+    after, arena, params = ending.pose, setup.arena, setup.params
     dx, dy = to_robot(world.pose, after.x, after.y)
     seed = fold(world.seed, ODOMETRY, world.decisions)
-    moved, variances = drift((dx, dy, wrap_angle(after.yaw - world.pose.yaw)), settings.odometry, seed)
+    moved, variances = drift((dx, dy, wrap_angle(after.yaw - world.pose.yaw)), params.odometry, seed)
     outside = (after.x < 0) | (after.x > arena.size_xy[0]) | (after.y < 0) | (after.y > arena.size_xy[1])
     return Execution(
         pose=after,
         moved=jnp.stack(moved),
         variances=variances,
-        time=duration(command, settings.durations),
+        time=duration(command, params.durations),
         distance=jnp.hypot(dx, dy),
-        collided=collided,
-        fell=fell & ~collided,
+        collided=ending.collided,
+        fell=ending.fell & ~ending.collided,
         outside=outside,
     )

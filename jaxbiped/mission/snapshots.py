@@ -10,22 +10,20 @@ from jaxtyping import Array, Bool, Float
 from jaxbiped import planning
 from jaxbiped.arenas.arena import CIRCLE, Arena
 from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import to_world
 from jaxbiped.mapping import level_view
 from jaxbiped.mapping.cobstacles import occupied_levels
 from jaxbiped.mission.decision import DecisionTrace
 from jaxbiped.mission.log import Ground, Mark, Outline, Walk
-from jaxbiped.mission.settings import MissionParams, MissionSpec
-from jaxbiped.mission.state import WorldState
+from jaxbiped.mission.params import MissionParams, MissionSpec
 
 
-def moment(
-    world: WorldState, thought: DecisionTrace, settings: MissionParams, program: MissionSpec, action: str
-) -> dict:
+def moment(world: WorldState, thought: DecisionTrace, params: MissionParams, spec: MissionSpec, action: str) -> dict:
     """The record of one decision in a log."""
-    points, counts, voxels = jax.device_get(as_mapped(thought, settings, program))
-    plan = planned_way(thought, settings, program)
-    world, pose, seen, measuring = jax.device_get((world, thought.pose, thought.landmarks, settings.durations.measure))
+    points, counts, voxels = jax.device_get(as_mapped(thought, params, spec))
+    plan = planned_way(thought, params, spec)
+    world, pose, seen, measuring = jax.device_get((world, thought.pose, thought.landmarks, params.durations.measure))
     return {
         "classes": np.asarray(thought.classes)[0],
         "levels": np.asarray(thought.levels)[0],
@@ -42,19 +40,19 @@ def moment(
     }
 
 
-@ready_jit(static_argnames=("program",))
+@ready_jit(static_argnames=("spec",))
 def as_mapped(
-    thought: DecisionTrace, settings: MissionParams, program: MissionSpec
+    thought: DecisionTrace, params: MissionParams, spec: MissionSpec
 ) -> tuple[Float[Array, "N 3"], Bool[Array, "N"], Bool[Array, "H W Z"]]:
     """The points of a view as used by the map [m, believed world], which of them count, and occupied voxels."""
-    spec, mapping = program.spec, settings.mapping
+    grid, mapping = spec.grid, params.mapping
     view, evidence, pose = jax.tree.map(lambda leaf: leaf[0], (thought.view, thought.evidence, thought.pose))
-    if not program.knows_pose:
-        view = level_view(view, pose.z, mapping, spec)
+    if not spec.knows_pose:
+        view = level_view(view, pose.z, mapping, grid)
     points = jnp.stack([*to_world(pose, view.x, view.y), view.z + pose.z], axis=-1)
     counts = (view.weight > 0) & (view.x**2 + view.y**2 < mapping.max_range**2) & jnp.all(jnp.isfinite(points), axis=-1)
-    bits = jnp.arange(spec.levels + spec.lowest, dtype=jnp.uint32)
-    return points, counts, (occupied_levels(evidence, mapping, spec)[..., None] >> bits) & 1 != 0
+    bits = jnp.arange(grid.levels + grid.lowest, dtype=jnp.uint32)
+    return points, counts, (occupied_levels(evidence, mapping, grid)[..., None] >> bits) & 1 != 0
 
 
 def walk_of(walked: list[list[np.ndarray]]) -> Walk | None:
@@ -66,9 +64,9 @@ def walk_of(walked: list[list[np.ndarray]]) -> Walk | None:
     return Walk(np.stack(states), np.concatenate(moment).astype(np.float32))
 
 
-def nothing(world: WorldState, program: MissionSpec) -> dict:
+def nothing(world: WorldState, spec: MissionSpec) -> dict:
     """The only moment of a mission that ended before it began."""
-    blank = np.zeros(program.spec.shape, np.int8)
+    blank = np.zeros(spec.grid.shape, np.int8)
     here = pose_of(world)
     return {
         "classes": blank,
@@ -82,7 +80,7 @@ def nothing(world: WorldState, program: MissionSpec) -> dict:
         "squat": bool(np.asarray(world.squat)[0]),
         "seen": 0,
         "points": np.zeros((0, 3), np.float32),
-        "voxels": np.zeros((*program.spec.shape, program.spec.levels + program.spec.lowest), bool),
+        "voxels": np.zeros((*spec.grid.shape, spec.grid.levels + spec.grid.lowest), bool),
     }
 
 
@@ -91,29 +89,29 @@ def pose_of(world: WorldState) -> Float[np.ndarray, "3"]:
     return np.array([float(np.asarray(v)[0]) for v in (world.pose.x, world.pose.y, world.pose.yaw)])
 
 
-def mind_pose(mind) -> Float[np.ndarray, "3"]:
+def agent_pose(agent) -> Float[np.ndarray, "3"]:
     """Believed (x, y, yaw) of the only mission of a batch."""
-    pose = mind.belief.pose
+    pose = agent.belief.pose
     return np.array([float(np.asarray(v)[0]) for v in (pose.x, pose.y, pose.yaw)])
 
 
-def planned_way(thought: DecisionTrace, settings: MissionParams, program: MissionSpec) -> Float[np.ndarray, "n 2"]:
+def planned_way(thought: DecisionTrace, params: MissionParams, spec: MissionSpec) -> Float[np.ndarray, "n 2"]:
     """Cell centres [m] of the planned path, starting at the robot's cell; empty if there is none."""
-    spec = program.spec
-    moves = np.asarray(way(thought, settings))[0]
+    grid = spec.grid
+    moves = np.asarray(way(thought, params))[0]
     moves = moves[: np.argmax(moves < 0)] if np.any(moves < 0) else moves
     if len(moves) == 0:
         return np.zeros((0, 2))
     cells = np.asarray(thought.problem.start_ij)[0] + np.vstack(
         [np.zeros((1, 2), int), np.cumsum(planning.DIRECTIONS[moves], axis=0)]
     )
-    return (cells[:, ::-1] + 0.5) * spec.pitch
+    return (cells[:, ::-1] + 0.5) * grid.pitch
 
 
 @ready_jit
-def way(thought: DecisionTrace, settings: MissionParams):
+def way(thought: DecisionTrace, params: MissionParams):
     """Moves of the planned path, of which `decide` reads the first."""
-    return settings.planner.whole_way(thought.problem, thought.route)
+    return params.planner.whole_way(thought.problem, thought.route)
 
 
 def outlines(arena: Arena) -> tuple[Outline, ...]:

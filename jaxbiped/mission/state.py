@@ -9,60 +9,18 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, UInt32
 
-from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height
+from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.localisation.kalman_filter import Belief
 from jaxbiped.localisation.scan_match import Outlines, no_outlines
-from jaxbiped.mapping import GridMap, GridSpec, empty
+from jaxbiped.mapping import GridMap, empty
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import ICP, VISUAL, MissionParams
+from jaxbiped.mission.params import ICP, VISUAL
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.sensing.edges import Edge, unknown
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Planned:
-    """Statistics of a mission's planning."""
-
-    seconds: Float[Array, "*B"]  # [s] time taken; NaN if not known
-    calls: Int[Array, "*B"]
-    cost: Float[Array, "*B"]  # by Eq. 1, of the first path found; NaN if not known
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class WorldState:
-    """The referee's side: read only by sensors and executors, never by the robot."""
-
-    pose: Pose  # true pose of the robot
-    squat: Bool[Array, "*B"]  # its stance
-    distance: Float[Array, "*B"]  # [m] walked
-    time: Float[Array, "*B"]  # [s]
-    measurements: Int[Array, "*B"]
-    decisions: Int[Array, "*B"]
-    code: Int[Array, "*B"]  # Code
-    seed: UInt32[Array, "*B"]  # seed of all noise of this mission
-    pose_error: Float[Array, "*B"]  # [m] distance from the believed position
-    yaw_error: Float[Array, "*B"]  # [rad] the same for yaw, without sign
-    planned: Planned
-    before: Pose | None = None  # its pose one command earlier; only if its motion is measured
-    metrics: tuple = ()  # state of each metric of the settings
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class BodyPose:
-    """The true pose of a robot's body: of the robot frame to which its cameras are fixed.
-
-    In the home posture it is the frame of the feet; otherwise that frame, moved and tilted like the torso.
-    """
-
-    pose: Pose  # its origin and yaw
-    roll: Float[Array, "*B"]  # [rad] to the right
-    pitch: Float[Array, "*B"]  # [rad] forward and down
 
 
 @jax.tree_util.register_dataclass
@@ -99,29 +57,28 @@ class AgentState:
 
 
 @with_own_settings
-def start(
-    arena: Arena, settings: MissionParams, seed: UInt32[Array, ""], spec: GridSpec, localisation: str = "landmarks"
-) -> tuple[WorldState, AgentState]:
+def start(setup: MissionSetup, seed: UInt32[Array, ""]) -> tuple[WorldState, AgentState]:
     """One mission before its first measurement. The robot knows its initial pose (paper, 2, condition 2)."""
+    arena, params, grid, localisation = setup.arena, setup.params, setup.spec.grid, setup.spec.localisation
     x, y, yaw = arena.start_xyyaw
     pose = Pose(x, y, ground_height(arena, x, y), yaw)
     away = jnp.hypot(arena.goal_xy[0] - x, arena.goal_xy[1] - y)
     no, zero = jnp.zeros((), bool), jnp.zeros((), jnp.int32)
-    code = jnp.where(away <= settings.limits.goal_radius, Code.REACHED, Code.RUNNING).astype(jnp.int32)
+    code = jnp.where(away <= params.limits.goal_radius, Code.REACHED, Code.RUNNING).astype(jnp.int32)
     code = jnp.where(jnp.isfinite(away) & jnp.isfinite(yaw), code, Code.INVALID)
     visual = localisation in VISUAL
     none = jnp.zeros(())
     planned = Planned(none, zero, jnp.full_like(none, jnp.nan))
-    metrics = begun(settings.metrics, arena, settings)
+    metrics = begun(params.metrics, arena, params)
     world = WorldState(
         pose, no, none, none, zero, zero, code, seed, none, none, planned, pose if visual else None, metrics
     )
-    belief = Belief(pose, jnp.diag(settings.limits.start_variance))
-    outlines = no_outlines(spec) if localisation in ICP else None
+    belief = Belief(pose, jnp.diag(params.limits.start_variance))
+    outlines = no_outlines(grid) if localisation in ICP else None
     anchor = Anchor(belief, no, no, jnp.zeros(3), jnp.zeros(3), no) if visual else None
     return world, AgentState(
         belief=belief,
-        grid_map=empty(spec),
+        grid_map=empty(grid),
         squat=no,
         look=no,
         tries=zero,
@@ -130,7 +87,7 @@ def start(
         behind=unknown(),
         since=none,
         planned=planned,
-        plan_state=settings.planner.initial_state(spec.shape),
+        plan_state=params.planner.initial_state(grid.shape),
         anchor=anchor,
         outlines=outlines,
     )

@@ -14,9 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
+from jaxbiped.geometry.pose import to_world, wrap_angle
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.motion.edge import crossing_direction
+from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.motion.robot import Footing
 from jaxbiped.motion.selection import cell_of
@@ -47,24 +48,28 @@ class Crossing:
     along: Float[Array, "*B"]  # [m] to the left of the robot, along the edge, where the path crosses it
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class NearEdges:
+    """Edges that the robot measured, in its frame."""
+
+    measured: Edge  # the next one on the path; if not known, the map's is used
+    held: Edge  # the one that it was about to cross at its last decision, which its path may have left
+    behind: Edge  # the one that it crossed; it does not turn much before its feet are clear of it
+
+
 def foresight(spec: GridSpec) -> int:
     """Number of moves of the path that are examined."""
     return max(1, round(FORESIGHT / spec.pitch))
 
 
-def next_crossing(
-    pose: Pose,
-    ij: Int[Array, "2"],
-    directions: Int[Array, "n"],
-    classes: Int[Array, "H W"],
-    levels: Int[Array, "H W"],
-    spec: GridSpec,
-) -> Crossing:
+def next_crossing(local: LocalMap, directions: Int[Array, "n"]) -> Crossing:
     """The first edge that a path crosses before it enters unmeasured cells.
 
     Args:
       directions: first moves of the path, indices into DIRECTIONS; -1 after its end.
     """
+    classes, levels, ij, pose, spec = local.classes, local.levels, local.ij, local.pose, local.grid
     steps = jnp.where((directions >= 0)[:, None], jnp.asarray(DIRECTIONS)[jnp.maximum(directions, 0)], 0)
     cells = jnp.concatenate([ij[None], ij[None] + jnp.cumsum(steps, axis=0)])
     kinds, heights = classes[cells[:, 0], cells[:, 1]], levels[cells[:, 0], cells[:, 1]].astype(jnp.int32)
@@ -94,28 +99,21 @@ def remembered(edge: Edge, crossing: Crossing) -> Edge:
 
 def approach(
     command: Command,
-    pose: Pose,
-    ij: Int[Array, "2"],
+    local: LocalMap,
     crossing: Crossing,
-    measured: Edge,
-    held: Edge,
-    behind: Edge,
-    classes: Int[Array, "H W"],
-    levels: Int[Array, "H W"],
+    edges: NearEdges,
     looked: Bool[Array, ""],
     footing: Footing,
-    spec: GridSpec,
 ) -> Command:
     """The command that takes the robot along its path, and over an edge only from the right place before it.
 
     Args:
       command: the command from `selection.select`; it is played as long as no edge is near.
       crossing: the next edge on the path, according to the map.
-      measured: the same edge, as measured; if not known, the map's is used.
-      held: the edge that it was about to cross at its last decision, which its path may have left.
-      behind: the edge that the robot crossed; it does not turn much before its feet are clear of it.
+      edges: edges that were measured, that one among them.
       looked: the robot has just looked down from here.
     """
+    measured = edges.measured
     edge = jax.tree.map(lambda m, c: jnp.where(measured.known, m, c), measured, crossing.edge)
     s, angle, up = edge.distance, edge.angle, edge.rise > 0
     near = crossing.edge.known & (s < NEAR)
@@ -123,7 +121,7 @@ def approach(
     gap = s - stand
     sd_s, sd_angle = jnp.sqrt(edge.cov[0, 0]), jnp.sqrt(edge.cov[1, 1])
     sure = measured.known & (sd_s < SURE_DISTANCE) & (sd_angle < SURE_ANGLE)
-    lane = best_lane(pose, ij, edge, footing, classes, levels, spec)
+    lane = best_lane(local, edge, footing)
 
     askew = jnp.abs(angle) > ASKEW
     room = turning_room(angle, up, footing)
@@ -147,7 +145,7 @@ def approach(
     length = jnp.where(tight, retreat, length)
     length = jnp.where(ready, footing.length, jnp.where(look, 0.0, length))
     step = jnp.where(up, Primitive.STEP_UP_BUMP, Primitive.STEP_DOWN_BUMP)
-    in_gate = classes[ij[0], ij[1]] == Cell.GATE
+    in_gate = local.classes[local.ij[0], local.ij[1]] == Cell.GATE
     walk = jnp.where(in_gate, Primitive.PASS_GATE, Primitive.STRAIGHT_FORWARD)
     walk = jnp.where(length == 0, Primitive.NONE, walk)
     near_command = Command(
@@ -160,8 +158,8 @@ def approach(
     )
     far_command = short_of(crossing, s, angle, command)
     chosen = jax.tree.map(lambda a, b: jnp.where(near, a, b), near_command, far_command)
-    chosen = clear_of(behind, chosen, pose, classes, levels, footing, spec)
-    return back_off(held, chosen, footing)
+    chosen = clear_of(edges.behind, chosen, local, footing)
+    return back_off(edges.held, chosen, footing)
 
 
 def turning_room(angle: Float[Array, ""], up: Bool[Array, ""], footing: Footing) -> Float[Array, ""]:
@@ -175,16 +173,9 @@ def turning_room(angle: Float[Array, ""], up: Bool[Array, ""], footing: Footing)
     return jnp.where(up, toes, ankles)
 
 
-def best_lane(
-    pose: Pose,
-    ij: Int[Array, "2"],
-    edge: Edge,
-    footing: Footing,
-    classes: Int[Array, "H W"],
-    levels: Int[Array, "H W"],
-    spec: GridSpec,
-) -> Float[Array, ""]:
+def best_lane(local: LocalMap, edge: Edge, footing: Footing) -> Float[Array, ""]:
     """How far [m] to the left the robot should cross the edge: as little as the map allows."""
+    classes, levels, ij = local.classes, local.levels, local.ij
     here, along = levels[ij[0], ij[1]].astype(jnp.int32), jnp.asarray(LANES)
     landing = footing.length - jnp.where(edge.rise > 0, footing.before_up, footing.before_down)
     before = jnp.where(edge.rise > 0, jnp.array([-0.07, -0.04]), jnp.array([-0.04, -0.04]))
@@ -194,7 +185,7 @@ def best_lane(
         """Class and level at `u` beyond the edge and `v` to the left."""
         cos, sin = jnp.cos(edge.angle), jnp.sin(edge.angle)
         u = u + edge.distance
-        i, j = cell_of(*to_world(pose, u * cos - v * sin, u * sin + v * cos), spec)
+        i, j = cell_of(*to_world(local.pose, u * cos - v * sin, u * sin + v * cos), local.grid)
         return classes[i, j], levels[i, j].astype(jnp.int32)
 
     bad = jnp.zeros(along.shape)
@@ -212,16 +203,9 @@ def best_lane(
     return along[jnp.argmin(bad + jnp.abs(along))]
 
 
-def clear_of(
-    behind: Edge,
-    command: Command,
-    pose: Pose,
-    classes: Int[Array, "H W"],
-    levels: Int[Array, "H W"],
-    footing: Footing,
-    spec: GridSpec,
-) -> Command:
+def clear_of(behind: Edge, command: Command, local: LocalMap, footing: Footing) -> Command:
     """The command, or a straight walk away from the edge behind if the command turns too close to it."""
+    classes, levels, pose, spec = local.classes, local.levels, local.pose, local.grid
     clear = jnp.where(behind.rise > 0, footing.clear_up, footing.clear_down)
     short = jnp.clip(clear + behind.distance, 0.0, 0.06)
     turns = (jnp.abs(command.turn) > LARGE) & (command.primitive != Primitive.LOOK)

@@ -7,10 +7,11 @@ import math
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from jaxbiped.geometry.pose import Pose, wrap_angle
+from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.motion.edge import crossing_direction
 from jaxbiped.motion.grid_units import CELL
+from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.planning import DIRECTIONS
 
@@ -31,15 +32,7 @@ def cell_of(x: Float[Array, "*S"], y: Float[Array, "*S"], spec: GridSpec) -> Int
     return jnp.stack([i, j]).astype(jnp.int32)
 
 
-def select(
-    pose: Pose,
-    ij: Int[Array, "2"],
-    directions: Int[Array, "n"],
-    classes: Int[Array, "H W"],
-    levels: Int[Array, "H W"],
-    looked: Bool[Array, ""],
-    spec: GridSpec,
-) -> Command:
+def select(local: LocalMap, directions: Int[Array, "n"], looked: Bool[Array, ""]) -> Command:
     """The command that takes the robot along the first moves of its path.
 
     The robot turns to the next cell's centre and walks there, which also corrects its offset from its own cell's
@@ -48,11 +41,11 @@ def select(
     above 1, cells in one line and of one kind are walked as one primitive.
 
     Args:
-      pose: the believed pose.
-      ij: its cell, on whose level the robot stands.
+      local: on the level of whose cell the robot stands.
       directions: first moves of the path, indices into DIRECTIONS; -1 after its end. The first must be a move.
       looked: the robot has already looked down from here.
     """
+    classes, levels, ij, pose, spec = local.classes, local.levels, local.ij, local.pose, local.grid
     moves = jnp.asarray(DIRECTIONS)
     step_ij = moves[directions[0]]
     reach = jnp.arange(1, directions.shape[0] + 1)

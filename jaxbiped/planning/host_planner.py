@@ -20,7 +20,7 @@ from jaxbiped.core.time_limit import TimeLimit, within
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import Costs
-from jaxbiped.planning.path_check import read_ways
+from jaxbiped.planning.path_check import PathQuery, read_ways
 from jaxbiped.planning.planners import FAILED, FINE, TOO_SLOW, Planner, Problem, Route
 
 MapPlanner = Callable[[np.ndarray, np.ndarray, tuple[int, int], tuple[int, int], Costs], Any]
@@ -146,19 +146,21 @@ def answer(classes, levels, start, goal, costs, rules, active, numbers):
     for k in np.flatnonzero(active).tolist():
         function, limit = FUNCTIONS[numbers[k]]
         begun = time.perf_counter()
-        fault[k], ways[k] = call(function, limit, given[k], raised[k], tuple(starts[k]), tuple(goals[k]), own[rows[k]])
+        fault[k], ways[k] = call(
+            function, limit, (given[k], raised[k], tuple(starts[k]), tuple(goals[k]), own[rows[k]])
+        )
         seconds[k] = time.perf_counter() - begun
-    moves, cost, wrong = read_ways(ways, grids, levels, start, goal, costs, rules[:, 0], length)
+    moves, cost, wrong = read_ways(ways, PathQuery(grids, levels, start, goal, costs, rules[:, 0]), length)
     for k, message in wrong.items():
         fault[k] = FAILED
         tell(FUNCTIONS[numbers[k]][0], message)
     return moves, cost, seconds, fault
 
 
-def call(function: MapPlanner, limit: float, classes, levels, start, goal, costs: Costs) -> tuple[int, Any]:
-    """The fault of one call, and the value returned."""
+def call(function: MapPlanner, limit: float, arguments: tuple) -> tuple[int, Any]:
+    """The fault of one call with these arguments, and the value returned."""
     try:
-        return FINE, within(limit, function, classes, levels, start, goal, costs)
+        return FINE, within(limit, function, *arguments)
     except TimeLimit:
         return TOO_SLOW, None
     except KeyboardInterrupt:  # from the user, not from the function

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,26 +19,34 @@ for (_di, _dj), _code in DIRECTION_OF.items():
     CODES[_di + 1, _dj + 1] = _code
 
 
-def read_ways(
-    ways: list[Any],
-    classes: np.ndarray,
-    levels: np.ndarray,
-    start: np.ndarray,
-    goal: np.ndarray,
-    costs: np.ndarray,
-    cutting: np.ndarray,
-    length: int,
-) -> tuple[np.ndarray, np.ndarray, dict[int, str]]:
+class PathQuery(NamedTuple):
+    """What an outside planner was asked: for one map, or for a batch."""
+
+    classes: np.ndarray  # [*B, H, W]
+    levels: np.ndarray  # [*B, H, W]
+    start: Any  # [*B, 2]
+    goal: Any  # [*B, 2]
+    costs: Any  # `Costs`, or [B, 5]
+    cutting: Any  # [*B] whether corners may be cut
+
+    def of(self, k: int) -> PathQuery:
+        """That of one map of a batch."""
+        classes, levels, start, goal, costs, cutting = (part[k] for part in self)
+        return PathQuery(classes, levels, start, goal, Costs(*costs.tolist()), bool(cutting))
+
+
+def read_ways(ways: list[Any], query: PathQuery, length: int) -> tuple[np.ndarray, np.ndarray, dict[int, str]]:
     """`read_way` of a batch at once, since one by one it takes longer than many a planner.
 
     Args:
       ways: the returned path of each map; None: there is none.
-      classes, levels: [B, H, W]. start, goal: [B, 2]. costs: [B, 5]. cutting: [B], whether corners may be cut.
+      query: of the batch.
       length: most moves that are kept.
 
     Returns:
       moves int8 [B, length], -1 after the end; costs float32 [B], NaN without a path; what is wrong with which path.
     """
+    classes, levels, start, goal, costs, cutting = query
     moves = np.full((len(ways), length), -1, np.int8)
     cost, wrong = np.full(len(ways), np.nan, np.float32), {}
     paths, maps = [], []
@@ -93,7 +101,7 @@ def read_ways(
     for n in np.flatnonzero(bad).tolist():
         k = maps[n]
         try:
-            read_way(ways[k], classes[k], levels[k], start[k], goal[k], Costs(*costs[k].tolist()), bool(cutting[k]))
+            read_way(ways[k], query.of(k))
         except ValueError as error:
             wrong[k] = str(error)
     return moves, cost, wrong
@@ -117,12 +125,13 @@ def whole_cells(way) -> np.ndarray:
     return whole
 
 
-def read_way(way, classes, levels, start, goal, costs: Costs, cutting: bool) -> tuple[np.ndarray, float]:
+def read_way(way, query: PathQuery) -> tuple[np.ndarray, float]:
     """The moves of one path, and its cost by Eq. 1.
 
     Raises:
       ValueError: what is wrong with the path.
     """
+    classes, levels, start, goal, costs, cutting = query
     whole = whole_cells(way)
     if tuple(whole[0]) != tuple(start) or tuple(whole[-1]) != tuple(goal):
         ends = f"{whole[0].tolist()} to {whole[-1].tolist()}"

@@ -6,7 +6,7 @@ lazy_package(
     __name__,
     {
         "animation": "save_gif",
-        "pictures": "draw_map save_map save_mission",
+        "pictures": "MapOverlay draw_map save_map save_mission",
         "comparison_report": "Report",
         "sweep": "SweepReport",
         "folder_report": "write_report",

@@ -14,7 +14,7 @@ from jaxbiped.files import write_whole
 from jaxbiped.report.answer_text import answer
 from jaxbiped.report.examples import example_section
 from jaxbiped.report.figures import write_figures
-from jaxbiped.report.page import PAGE, Section, page_of, render
+from jaxbiped.report.page import PAGE, PageNotes, Section, page_of, render
 from jaxbiped.report.stopping import stopping_sentences
 from jaxbiped.report.tables import markdown_sheets, to_markdown
 from jaxbiped.report.words import number
@@ -79,11 +79,13 @@ def write_comparison_report(folder: str | Path, *, point: int = 0, resamples: in
         frame,
         comparison,
         manifest,
-        title=question(comparison) if comparison.question else "One strategy on random arenas",
-        limitations=LIMITATIONS,
-        commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
-        more=more,
-        warnings=remarks,
+        PageNotes(
+            title=question(comparison) if comparison.question else "One strategy on random arenas",
+            limitations=LIMITATIONS,
+            commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
+            more=more,
+            warnings=remarks,
+        ),
     )
     texts = {PAGE: render(page), SUMMARY: summary(comparison, manifest, figures, remarks)}
     for name, text in texts.items():

@@ -13,7 +13,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.report.page import Section
 from jaxbiped.report.page_figures import WIDTH, Plot
-from jaxbiped.report.pictures import draw_map, moment
+from jaxbiped.report.pictures import MapOverlay, draw_map, moment
 from jaxbiped.report.style import own_style
 from jaxbiped.study.replay import Origin, examples, play_again
 
@@ -70,11 +70,13 @@ def last_map(mission: Mission) -> Figure:
     draw_map(
         figure.subplots(),
         moment(log, len(log.time) - 1),
-        track_xy=log.true_xyyaw[:, :2],
-        start_xy=tuple(log.true_xyyaw[0, :2]),
-        goal_xy=tuple(log.goal_xy),
-        outlines=log.outlines,
-        landmarks=log.landmarks,
+        MapOverlay(
+            track_xy=log.true_xyyaw[:, :2],
+            start_xy=tuple(log.true_xyyaw[0, :2]),
+            goal_xy=tuple(log.goal_xy),
+            outlines=log.outlines,
+            landmarks=log.landmarks,
+        ),
     )
     return figure
 

@@ -11,7 +11,7 @@ import polars as pl
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import PrimitiveTable
 from jaxbiped.biped.trial import RIMS, nominal_edge
-from jaxbiped.mission.library import Entry, Feet, LibraryConfig, Rims, Window
+from jaxbiped.executors.motion_library import Entry, Feet, LibraryConfig, Rims, Window
 
 SET = "mild"  # the set of trials that the library's displacements come from
 

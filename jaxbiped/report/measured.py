@@ -13,7 +13,17 @@ from matplotlib.figure import Figure
 
 from jaxbiped.core.class_grid import ClassGrid
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.report.pictures import CENTIMETRES, COLOURS, INK, METRES, Axis, draw_map, hillshade, save_figure
+from jaxbiped.report.pictures import (
+    CENTIMETRES,
+    COLOURS,
+    INK,
+    METRES,
+    Axis,
+    MapOverlay,
+    draw_map,
+    hillshade,
+    save_figure,
+)
 from jaxbiped.report.style import own_style
 
 LARGEST_IN_CENTIMETRES = 5.0  # [m] a map beyond this is drawn in metres
@@ -155,7 +165,7 @@ def save_classes(
     ax = figure.subplots()
     x0, x1, y0, y1 = grid.extent
     on_map = camera_xy is not None and x0 <= camera_xy[0] < x1 and y0 <= camera_xy[1] < y1
-    draw_map(ax, grid, start_xy=camera_xy if on_map else None, axis=fitting_axis(grid))
+    draw_map(ax, grid, MapOverlay(start_xy=camera_xy if on_map else None), axis=fitting_axis(grid))
     ax.set_title(title, fontsize=10)
     handles = [patches.Patch(fc=COLOURS[cell], ec="#888888", lw=0.6, label=cell.name.lower()) for cell in Cell]
     figure.legend(handles=handles, loc="outside lower center", ncols=5, fontsize=8, frameon=False, labelcolor=INK)

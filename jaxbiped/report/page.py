@@ -148,36 +148,34 @@ def facts(comparison: Comparison, manifest: Manifest) -> dict[str, str]:
     }
 
 
-def page_of(
-    frame: pl.DataFrame,
-    comparison: Comparison,
-    manifest: Manifest,
-    *,
-    title: str,
-    limitations: tuple[str, ...],
-    commands: tuple[str, ...],
-    more: tuple[Section, ...] = (),
-    warnings: tuple[str, ...] = (),
-) -> Page:
+@dataclass(frozen=True)
+class PageNotes:
+    """What the page of a comparison says besides its numbers."""
+
+    title: str
+    limitations: tuple[str, ...]
+    commands: tuple[str, ...]  # that made it
+    more: tuple[Section, ...] = ()  # sections between the tables and the limitations
+    warnings: tuple[str, ...] = ()  # what to read first
+
+
+def page_of(frame: pl.DataFrame, comparison: Comparison, manifest: Manifest, notes: PageNotes) -> Page:
     """The page of one comparison.
 
     Args:
       frame: the rows that the comparison was made from.
-      commands: the commands that made it.
-      more: sections between the tables and the limitations.
-      warnings: what to read first.
     """
     arenas = comparison.summary(comparison.strategies[0]).n
     kicker = f"jaxbiped · {arenas:,} random arenas · seed {manifest.seed} · intervals at {100 * comparison.level:g} %"
     return Page(
-        title=title,
+        title=notes.title,
         kicker=kicker,
         answer=tuple(typeset(sentence) for sentence in answer(comparison)),
         keys=keys(comparison),
-        sections=(*sections(frame, comparison), *more),
-        limitations=limitations,
-        commands=commands,
+        sections=(*sections(frame, comparison), *notes.more),
+        limitations=notes.limitations,
+        commands=notes.commands,
         facts=facts(comparison, manifest),
         config=json.dumps(manifest.config, indent=2, sort_keys=True),
-        warnings=warnings,
+        warnings=notes.warnings,
     )

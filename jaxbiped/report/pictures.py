@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import matplotlib.patches as patches
@@ -38,6 +39,20 @@ MOST_SHADE = 0.55  # opacity of terrain shadows
 MOST_ARROWS = 150  # beyond that, a plan is a line
 
 
+@dataclass(frozen=True)
+class MapOverlay:
+    """What is drawn over a map: a mission, and the truth behind the map."""
+
+    plan_xy: Float[np.ndarray, "n 2"] | None = None  # [m] planned path: arrows, or a line if there are many points
+    track_xy: Float[np.ndarray, "m 2"] | None = None  # [m] path walked
+    start_xy: tuple[float, float] | None = None  # [m] a ring
+    goal_xy: tuple[float, float] | None = None  # [m] a cross
+    goal_radius: float | None = GOAL_RADIUS  # [m] of a dashed circle around it; None: no circle
+    outlines: tuple[Outline, ...] = ()
+    landmarks: tuple[Mark, ...] = ()
+    terrain: Ground | None = None
+
+
 def class_image(classes: Int8[np.ndarray, "H W"], levels: Int8[np.ndarray, "H W"]) -> UInt8[np.ndarray, "H W 3"]:
     """The map as RGB; bumps darken with their distance from level 0."""
     palette = np.array([to_rgb(COLOURS[cell]) for cell in Cell])
@@ -51,15 +66,8 @@ def class_image(classes: Int8[np.ndarray, "H W"], levels: Int8[np.ndarray, "H W"
 def draw_map(
     ax: Axes,
     grid: ClassGrid,
+    overlay: MapOverlay | None = None,
     *,
-    plan_xy: Float[np.ndarray, "n 2"] | None = None,
-    track_xy: Float[np.ndarray, "m 2"] | None = None,
-    start_xy: tuple[float, float] | None = None,
-    goal_xy: tuple[float, float] | None = None,
-    goal_radius: float | None = GOAL_RADIUS,
-    outlines: tuple[Outline, ...] = (),
-    landmarks: tuple[Mark, ...] = (),
-    terrain: Ground | None = None,
     axis: Axis = CENTIMETRES,
 ) -> None:
     """Draw a map and a mission on it into `ax`.
@@ -67,12 +75,9 @@ def draw_map(
     Args:
       ax: the axes to draw into.
       grid: the map.
-      plan_xy: [m] the planned path: arrows from point to point, or a line if there are many.
-      track_xy: [m] the path walked.
-      start_xy, goal_xy: [m] a ring, and a cross with a dashed circle of `goal_radius` [m] (None: no circle).
-      outlines, landmarks, terrain: the truth behind the map.
       axis: the unit of the axes.
     """
+    over = overlay or MapOverlay()
     k = axis.per_metre
     x0, x1, y0, y1 = (value * k for value in grid.extent)
     turn = turned(grid, k)
@@ -83,21 +88,21 @@ def draw_map(
     if small:
         draw_lines(ax, grid, k)
         draw_levels(ax, grid, k)
-    if terrain is not None:
-        draw_terrain(ax, terrain, k)
-    for outline in outlines:
+    if over.terrain is not None:
+        draw_terrain(ax, over.terrain, k)
+    for outline in over.outlines:
         ax.add_patch(patches.Polygon(outline.corners_xy * k, fill=False, ec=OUTLINES[outline.kind], lw=1.2, zorder=3))
-    for mark in landmarks:
+    for mark in over.landmarks:
         ax.add_patch(mark_patch(mark, k))
-    if track_xy is not None and len(track_xy) > 1:
+    if over.track_xy is not None and len(over.track_xy) > 1:
         halo = [effects.Stroke(linewidth=3.2, foreground="white"), effects.Normal()]
-        ax.plot(*(track_xy * k).T, color=TRACK, lw=1.6, marker="o", ms=2.2, zorder=5, path_effects=halo)
-    if plan_xy is not None and len(plan_xy) > 1:
-        draw_plan(ax, plan_xy * k)
-    if start_xy is not None:
-        ax.plot(start_xy[0] * k, start_xy[1] * k, "o", ms=8, mfc="white", mec=INK, mew=1.6, zorder=7)
-    if goal_xy is not None:
-        draw_goal(ax, goal_xy, goal_radius, k)
+        ax.plot(*(over.track_xy * k).T, color=TRACK, lw=1.6, marker="o", ms=2.2, zorder=5, path_effects=halo)
+    if over.plan_xy is not None and len(over.plan_xy) > 1:
+        draw_plan(ax, over.plan_xy * k)
+    if over.start_xy is not None:
+        ax.plot(over.start_xy[0] * k, over.start_xy[1] * k, "o", ms=8, mfc="white", mec=INK, mew=1.6, zorder=7)
+    if over.goal_xy is not None:
+        draw_goal(ax, over.goal_xy, over.goal_radius, k)
     corners = turn.transform([(x0, y0), (x1, y0), (x0, y1), (x1, y1)])
     (x0, y0), (x1, y1) = corners.min(0), corners.max(0)
     frame(ax, (x0, x1, y0, y1), axis)
@@ -204,17 +209,20 @@ def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
 
 
 @own_style()
-def save_map(path: str | Path, grid: ClassGrid, *, title: str = "", **what) -> None:
-    """Write a PNG of one map; `what` is passed to `draw_map`."""
+def save_map(
+    path: str | Path, grid: ClassGrid, overlay: MapOverlay | None = None, *, title: str = "", axis: Axis = CENTIMETRES
+) -> None:
+    """Write a PNG of one map, as `draw_map` draws it."""
+    over = overlay or MapOverlay()
     rows, columns = grid.shape
     width = 7.0
     figure = Figure(figsize=(width, float(np.clip(width * rows / columns, 2.5, 10)) + 0.7), layout="constrained")
     ax = figure.subplots()
-    draw_map(ax, grid, **what)
+    draw_map(ax, grid, over, axis=axis)
     ax.set_title(title, fontsize=10)
-    circle = what.get("goal_radius", GOAL_RADIUS) if what.get("goal_xy") is not None else None
-    shown = {"track": what.get("track_xy") is not None, "landmarks": what.get("landmarks", ())}
-    draw_legend(figure, truth=bool(what.get("outlines")), circle=circle, **shown)
+    circle = over.goal_radius if over.goal_xy is not None else None
+    shown = {"track": over.track_xy is not None, "landmarks": over.landmarks}
+    draw_legend(figure, truth=bool(over.outlines), circle=circle, **shown)
     save_figure(figure, path)
 
 
@@ -236,13 +244,15 @@ def save_mission(path: str | Path, log: MissionLog, *, title: str = "", panels: 
         draw_map(
             ax,
             moment(log, t),
-            plan_xy=log.plan[t],
-            track_xy=log.true_xyyaw[: t + 1, :2],
-            start_xy=tuple(log.true_xyyaw[0, :2]),
-            goal_xy=tuple(log.goal_xy),
-            outlines=log.outlines,
-            landmarks=log.landmarks,
-            terrain=log.terrain,
+            MapOverlay(
+                plan_xy=log.plan[t],
+                track_xy=log.true_xyyaw[: t + 1, :2],
+                start_xy=tuple(log.true_xyyaw[0, :2]),
+                goal_xy=tuple(log.goal_xy),
+                outlines=log.outlines,
+                landmarks=log.landmarks,
+                terrain=log.terrain,
+            ),
         )
         ax.set_title(f"{log.time[t]:.0f} s: {caption(log, t)}", fontsize=9)
     for ax in axes[len(moments) :]:

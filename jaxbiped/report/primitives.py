@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from rich.console import Group
 
 from jaxbiped.biped.gait import PrimitiveTable
+from jaxbiped.executors.motion_library import LibraryConfig
 from jaxbiped.files import write_whole
-from jaxbiped.mission.library import LibraryConfig
 from jaxbiped.report.library_file import displacement
 from jaxbiped.report.style import own_style
 from jaxbiped.report.tables import Sheet, to_markdown, to_rich

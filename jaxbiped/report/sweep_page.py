@@ -16,7 +16,7 @@ from jaxbiped.report.comparison_report import LIMITATIONS, looked_at
 from jaxbiped.report.figures import INK, canvas, error_bars, legend_above, look
 from jaxbiped.report.grid import to_grid, typeset
 from jaxbiped.report.metric_figure import own_metric
-from jaxbiped.report.page import PAGE, Section, page_of, render
+from jaxbiped.report.page import PAGE, PageNotes, Section, page_of, render
 from jaxbiped.report.page_figures import WIDTH, Plot
 from jaxbiped.report.svg import inline, themed
 from jaxbiped.report.sweep import LIMITATIONS as OF_SWEEPS
@@ -57,10 +57,12 @@ def write_sweep_page(
         frame,
         comparison,
         manifest,
-        title=title(report),
-        limitations=tuple(dict.fromkeys((*OF_SWEEPS, *LIMITATIONS))),
-        commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
-        more=looked_at(folder, frame, comparison, manifest, examples),
+        PageNotes(
+            title=title(report),
+            limitations=tuple(dict.fromkeys((*OF_SWEEPS, *LIMITATIONS))),
+            commands=(manifest.command, shlex.join(["jaxbiped", "report", str(folder)])),
+            more=looked_at(folder, frame, comparison, manifest, examples),
+        ),
     )
     kicker = f"jaxbiped · {len(result.points):,} sweep points · {page.kicker.partition(' · ')[2]}"
     at = f"At point {point}: {listed([f'{name} {value:g}' for name, value in chosen.values.items()])}"

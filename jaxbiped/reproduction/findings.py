@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from jaxbiped.mission.log import MissionLog
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.reproduction.account import Measuring, Record
 from jaxbiped.reproduction.mishaps import Ending
 from jaxbiped.reproduction.savings import Population

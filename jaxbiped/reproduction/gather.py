@@ -11,8 +11,8 @@ import numpy as np
 from jaxbiped.arenas import Arena
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.mission.oracle import oracle_plan
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.sensor_rig import SensorRig
-from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.reproduction.account import Record, record, typical
 from jaxbiped.reproduction.mishaps import MISHAPS, Ending, suffer
 from jaxbiped.reproduction.paper import EXPERIMENTS, TABLE_1, Experiment
@@ -65,9 +65,10 @@ MISSIONS = len(TABLE_1) * len(SCENES), len(MISHAPS), len(EXPERIMENTS)  # of `str
 def shortest(arena: Arena, config: MissionConfig, strategy: str) -> float | None:
     """[m] Length of the path preferred by Eq. (1) with perfect knowledge of a scene; None if there is none."""
     batch, points = (
-        jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], tree) for tree in (arena, config.settings(strategy))
+        jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], tree) for tree in (arena, config.params(strategy))
     )
-    length = float(oracle_plan(batch, points, program(config, tuple(map(float, arena.size_xy.round(6))))).length[0, 0])
+    spec = mission_spec(config, tuple(map(float, arena.size_xy.round(6))))
+    length = float(oracle_plan(batch, points, spec).length[0, 0])
     return length if np.isfinite(length) else None
 
 

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from jaxbiped.arenas import Arena, SceneConfig, to_arena
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.sensor_rig import SensorRig
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.reproduction.staging import play, play_changing
 
 START, GOAL = (0.375, 0.675, 0.0), (1.375, 0.675)  # [m, m, rad], [m]

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from jaxbiped.mission.log import MissionLog
 from jaxbiped.report.examples import picture
 from jaxbiped.report.page_figures import WIDTH, Plot
-from jaxbiped.report.pictures import draw_map, moment
+from jaxbiped.report.pictures import MapOverlay, draw_map, moment
 from jaxbiped.report.style import own_style
 
 KEY = (
@@ -24,12 +24,14 @@ def map_figure(log: MissionLog, t: int, *, plan: bool = True) -> Figure:
     draw_map(
         figure.subplots(),
         moment(log, t),
-        plan_xy=log.plan[t] if plan else None,
-        track_xy=log.true_xyyaw[: t + 1, :2],
-        start_xy=tuple(log.true_xyyaw[0, :2]),
-        goal_xy=tuple(log.goal_xy),
-        outlines=log.outlines,
-        landmarks=log.landmarks,
+        MapOverlay(
+            plan_xy=log.plan[t] if plan else None,
+            track_xy=log.true_xyyaw[: t + 1, :2],
+            start_xy=tuple(log.true_xyyaw[0, :2]),
+            goal_xy=tuple(log.goal_xy),
+            outlines=log.outlines,
+            landmarks=log.landmarks,
+        ),
     )
     return figure
 

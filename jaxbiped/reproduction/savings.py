@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 from jaxtyping import Int
 
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.motion.grid_units import CELL
 from jaxbiped.reproduction.paper import TABLE_2
 from jaxbiped.statistics.comparison import ALL, Comparison, PairComparison, compare

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -11,9 +12,10 @@ import jax.numpy as jnp
 from jaxbiped.arenas import Arena, load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import Mission, Recorder, turn_once
 from jaxbiped.mission.sensor_rig import SensorRig
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.study.runner import noise_of, play_one
 
@@ -32,7 +34,7 @@ def load_scenes(folder: Path, names: tuple[str, ...]) -> dict[str, Arena]:
 
 def play(arena: Arena, config: MissionConfig, strategy: str, seed: int, rig: SensorRig | None = None) -> Mission:
     """One mission, with its log. Consumes `jax.random.key(seed)`."""
-    return play_one(arena, config, strategy, noise_of(seed), rig=rig)
+    return play_one(arena, config, config.params(strategy), noise_of(seed), rig=rig)
 
 
 def play_changing(
@@ -43,17 +45,17 @@ def play_changing(
     Args:
       arena_at: the arena before each decision, counted from 0. Shapes, start and goal stay.
     """
-    arena, settings = arena_at(0), config.settings(strategy)
-    static = program(config, tuple(round(float(v), 6) for v in arena.size_xy))
-    noise = noise_of(seed)
-    world, mind = jax.tree.map(lambda leaf: leaf[None], start(arena, settings, noise, static.spec))
-    points = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], settings)
-    recorder = Recorder(settings, static, lambda _: None, rig)
+    arena, params = arena_at(0), config.params(strategy)
+    spec = mission_spec(config, tuple(round(float(v), 6) for v in arena.size_xy))
+    setup = MissionSetup(arena, params, spec)
+    world, agent = jax.tree.map(lambda leaf: leaf[None], start(setup, noise_of(seed)))
+    recorder = Recorder(params, spec, lambda _: None, rig)
     while world.code[0] == Code.RUNNING:
-        now = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], arena_at(int(world.decisions[0])))
+        setup = replace(setup, arena=arena_at(int(world.decisions[0])))
+        now = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], setup)
         before = world
-        seen = rig.see(world, mind, now, points) if rig else None
-        world, mind, _, command, thought = turn_once(world, mind, now, points, static, seen)
+        seen = rig.see(world, agent, now) if rig else None
+        world, agent, _, command, thought = turn_once(world, agent, now, seen)
         recorder.decided(0, before, command, thought)
-        recorder.concluded(0, world, mind)
+        recorder.concluded(0, world, agent)
     return recorder.mission(arena_at(int(world.decisions[0])), world)

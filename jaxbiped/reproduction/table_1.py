@@ -10,8 +10,8 @@ from jaxtyping import Bool, Int
 
 from jaxbiped.arenas import Arena
 from jaxbiped.mapping import Cell, truth_grid
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import Mission
-from jaxbiped.mission.settings import MissionConfig, program
 
 SCENES = {  # scene: the classes that its only path leads over, or around
     "table_1_floor": (Cell.FLOOR,),
@@ -35,8 +35,8 @@ class Shown:
 
 def shown(arena: Arena, mission: Mission, config: MissionConfig, kinds: tuple[Cell, ...]) -> Shown:
     """The result of a mission for some classes."""
-    spec = program(config, tuple(round(float(v), 6) for v in arena.size_xy)).spec
-    truth, _ = truth_on(arena, spec, config.robot.body())
+    grid = mission_spec(config, tuple(round(float(v), 6) for v in arena.size_xy)).grid
+    truth, _ = truth_on(arena, grid, config.robot.body())
     share = min(right(mission.log.classes[-1], np.asarray(truth), kind) for kind in kinds)
     return Shown(mission.code.label == "reached", mission.code.label, share >= ENOUGH, share)
 

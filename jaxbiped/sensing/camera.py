@@ -6,7 +6,7 @@ their parameter is the depth, and disparity = focal * baseline / depth. (Paper, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import jax
@@ -101,15 +101,25 @@ class Mount:
     forward: Float[Array, "*B"]  # [m]
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True)
+class MountedCamera:
+    """A camera on the robot, as it measures."""
+
+    camera: Camera
+    at: Mount
+    image: ImageSpec = field(metadata={"static": True})
+
+
 def check_camera(camera: Camera) -> None:
     """Check the parameters of a camera, if they are concrete.
 
     Raises:
       InputError: a number that is not finite; a focal length, baseline, or range of disparities that is not above 0.
     """
-    for field in fields(camera):
-        above = field.name in ("focal", "baseline", "max_disparity")
-        checks.finite(f"camera.{field.name}", getattr(camera, field.name), LEAST if above else -np.inf)
+    for number in fields(camera):
+        above = number.name in ("focal", "baseline", "max_disparity")
+        checks.finite(f"camera.{number.name}", getattr(camera, number.name), LEAST if above else -np.inf)
 
 
 def mount(camera: Camera, look: Bool[Array, ""] | bool = False, squat: Bool[Array, ""] | bool = False) -> Mount:

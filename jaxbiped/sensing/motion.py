@@ -16,7 +16,7 @@ from jaxtyping import Array, Float, UInt32
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
 from jaxbiped.sensing import counter_rng
-from jaxbiped.sensing.camera import Camera, ImageSpec, Mount
+from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, MountedCamera
 from jaxbiped.sensing.view import Motion, View
 
 VISUAL = 6  # channel of a view's seed
@@ -65,7 +65,7 @@ def track(
       at: the camera's pose on the robot in the last view.
       max_range: [m] from the camera; points beyond are not measured.
     """
-    share = overlap(view, pose, before, at, camera, image, max_range)
+    share = overlap(view, pose, before, MountedCamera(camera, at, image), max_range)
     shrink = jnp.sqrt(SHARE / jnp.maximum(share, LEAST_SHARE))
     sd = jnp.stack([noise.forward, noise.left, noise.yaw]) * shrink
     error = sd * counter_rng.normal(seed, np.arange(3), VISUAL)
@@ -81,15 +81,14 @@ def overlap(
     view: View,
     pose: Pose,
     before: Pose,
-    at: Mount,
-    camera: Camera,
-    image: ImageSpec,
+    eye: MountedCamera,
     max_range: Float[Array, ""] | float,
 ) -> Float[Array, ""]:
     """Share of the image's pixels whose points are also measured by the camera at `before`.
 
     Occlusion from there is not checked.
     """
+    camera, at, image = eye.camera, eye.at, eye.image
     x, y = to_robot(before, *to_world(pose, view.x, view.y))
     z = view.z + pose.z - before.z
     ahead, up = x - at.forward, z - at.height

@@ -12,7 +12,7 @@ from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.geometry.rays import cast_boxes, key, marked, nearness
 from jaxbiped.sensing import noise as stereo
-from jaxbiped.sensing.camera import Camera, ImageSpec, Mount, check_camera, mount, placed, rays
+from jaxbiped.sensing.camera import Camera, ImageSpec, MountedCamera, check_camera, mount, placed, rays
 from jaxbiped.sensing.noise import StereoNoise
 from jaxbiped.sensing.view import View
 
@@ -43,23 +43,20 @@ def measure(
       InputError: an argument of another rank, shape or type, a camera that `check_camera` rejects, NaN in `noise`.
     """
     check_camera(camera)
-    at = mount(camera, look, squat)
+    eye = MountedCamera(camera, mount(camera, look, squat), image)
     textured = arena.boxes.contrast >= noise.min_contrast, arena.floor_contrast >= noise.min_contrast
-    roll, pitch = stereo.attitude_error(noise, seed) if attitude is None else attitude
-    keys = cast(arena, pose, camera, at, image, roll, pitch, *textured)
+    attitude = stereo.attitude_error(noise, seed) if attitude is None else attitude
+    keys = cast(arena, pose, eye, attitude, *textured)
     disparity = nearness(keys) * (camera.focal * camera.baseline)
     disparity = stereo.match(disparity, marked(keys)[1:-1, 1:-1], camera, image, noise, seed)
-    return reproject(disparity, camera, at, image, noise.max_range)
+    return reproject(disparity, eye, noise.max_range)
 
 
 def cast(
     arena: Arena,
     pose: Pose,
-    camera: Camera,
-    at: Mount,
-    image: ImageSpec,
-    roll: Float[Array, ""],
-    pitch: Float[Array, ""],
+    eye: MountedCamera,
+    attitude: tuple[Float[Array, ""], Float[Array, ""]],
     box_marks: Bool[Array, "M"],
     floor_mark: Bool[Array, ""],
 ) -> Int32[Array, "padded_rows padded_columns"]:
@@ -67,8 +64,9 @@ def cast(
 
     Inverse depth is along the optical axis, and 0 where a ray leaves the arena: there is nothing beyond its rectangle.
     """
-    origin, basis = placed(pose, at, roll, pitch)
-    x, y = (values.reshape(-1) / camera.focal for values in np.meshgrid(*margin(image)))
+    image = eye.image
+    origin, basis = placed(pose, eye.at, *attitude)
+    x, y = (values.reshape(-1) / eye.camera.focal for values in np.meshgrid(*margin(image)))
     floor = key(cast_ground(arena, origin, basis, x, y), floor_mark)
     keys = cast_boxes(arena.boxes, box_marks, origin, basis, x, y, floor)
     return keys.reshape(image.rows + 2, image.columns + 2)
@@ -82,14 +80,9 @@ def margin(image: ImageSpec) -> tuple[Float[np.ndarray, "padded_columns"], Float
     )
 
 
-def reproject(
-    disparity: Float[Array, "rows columns"],
-    camera: Camera,
-    at: Mount,
-    image: ImageSpec,
-    max_range: Float[Array, ""] | float,
-) -> View:
+def reproject(disparity: Float[Array, "rows columns"], eye: MountedCamera, max_range: Float[Array, ""] | float) -> View:
     """Points in the robot frame for disparities [px] (0: not measured), for a robot that stands upright."""
+    camera, at, image = eye.camera, eye.at, eye.image
     # All from the quotient, in flat vectors: XLA then keeps it, and does not match or shuffle again for each result.
     depth = (camera.focal * camera.baseline / disparity).reshape(-1)
     x, y = (values.reshape(-1) for values in jnp.meshgrid(*rays(camera, image)))

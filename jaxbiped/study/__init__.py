@@ -6,6 +6,6 @@ lazy_package(
     __name__,
     {
         "stored_series": "Side Stored choose compare_sides open_stored",
-        "store": "Manifest Store StoredRows create read read_manifest read_points scan",
+        "store": "Manifest Store StoredRows StudyHeader create read read_manifest read_points scan",
     },
 )

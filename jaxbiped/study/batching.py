@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Int
@@ -15,15 +16,15 @@ from jaxbiped.arenas.source import OwnFamily, find_family, name_of
 from jaxbiped.core.component import kind_of, numbers_of, traced_component, with_numbers
 from jaxbiped.core.names import MOVING
 from jaxbiped.errors import InputError
+from jaxbiped.executors.config import WalkConfig
+from jaxbiped.executors.execution import find_executor
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.metric import Metric, column_of, find_metric
-from jaxbiped.mission.primitive_schedule import WalkConfig
+from jaxbiped.mission.params import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.sensor_rig import RENDERED
 from jaxbiped.mission.sensors import find_sensor
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.strategies import Strategy, find_strategy
-from jaxbiped.mission.terrain_check import program_for
+from jaxbiped.mission.terrain_check import checked_spec
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.arena_kinds import ANY, ArenaKind, kinds_of
@@ -41,20 +42,29 @@ class Point:
     own: dict[str, float] = field(default_factory=dict)  # those of components, such as `planner.clearance`
 
 
+class Common(NamedTuple):
+    """What the points of a group have in common."""
+
+    kind: ArenaKind
+    spec: MissionSpec
+    walk: WalkConfig | None  # for simulated bipeds
+    camera: CameraConfig | None  # for sensors that measure on the host
+
+
 @dataclass(frozen=True)
 class Group:
     """Points and strategies that differ only in traced numbers: `P` points, `S` strategies, one compiled program."""
 
     kind: ArenaKind
-    static: MissionSpec
+    spec: MissionSpec
     walk: WalkConfig | None  # for simulated bipeds
     camera: CameraConfig | None  # for sensors that measure on the host
     points: tuple[int, ...]  # indices of the points, ascending
     strategies: tuple[str, ...]  # their names
-    settings: MissionParams  # [P * S], strategy by strategy within a point
+    params: MissionParams  # [P * S], strategy by strategy within a point
     populations: Population | None  # [U], the distinct ones; None: no population fixes anything
-    population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `settings`
-    metrics: tuple[str, ...] = ()  # columns of the metrics of the settings
+    population_of: Int[np.ndarray, "PS"]  # row of `populations` of each row of `params`
+    metrics: tuple[str, ...] = ()  # columns of their metrics
 
     def rows(self, shard: Shard) -> int:
         """Number of rows in a shard of this group."""
@@ -129,7 +139,7 @@ def group_points(
     metrics: Mapping[str, Metric] | None = None,
     numbers: Mapping[str, float] | None = None,
 ) -> tuple[Group, ...]:
-    """Group points by what sets array shapes and code paths (`mission.program`), in order of first occurrence.
+    """Group points by what sets array shapes and code paths (`mission.mission_spec`), in order of first occurrence.
 
     Strategies whose planners are of different kinds get separate groups.
 
@@ -150,13 +160,13 @@ def group_points(
         simulated = point.mission.executor in SIMULATED
         walk = point.mission.walk if simulated else None
         camera = point.mission.camera if point.mission.sensor in RENDERED else None
-        static = program_for(point.mission, kinds[place].size_xy, kinds[place].terrain)
-        together.setdefault((place, static, walk, camera), []).append(point)
+        spec = checked_spec(point.mission, kinds[place].size_xy, kinds[place].terrain)
+        together.setdefault((place, spec, walk, camera), []).append(point)
     by_planner: dict[tuple, list[Strategy]] = {}
     for item in strategies:
         by_planner.setdefault(kind_of(item.planner), []).append(item)
     return tuple(
-        group(kinds[place], *key, members, same, metrics or {})
+        group(Common(kinds[place], *key), members, same, metrics or {})
         for (place, *key), members in together.items()
         for same in by_planner.values()
     )
@@ -192,18 +202,15 @@ def groups_of(config: StudyConfig, points: Sequence[Point] | None = None) -> tup
 
 
 def group(
-    kind: ArenaKind,
-    static: MissionSpec,
-    walk: WalkConfig | None,
-    camera: CameraConfig | None,
+    common: Common,
     points: Sequence[Point],
     strategies: Sequence[Strategy],
     metrics: Mapping[str, Metric],
 ) -> Group:
     """The group of the points of one program."""
-    settings, measured = [], tuple(traced_component(metric) for metric in metrics.values())
+    params, measured = [], tuple(traced_component(metric) for metric in metrics.values())
     for point in points:
-        first = point.mission.settings(strategies[0])
+        first = point.mission.params(strategies[0])
         for name in ("sensor", "executor"):
             component = with_numbers(getattr(first, name), numbers_under(name, point.own))
             first = replace(first, **{name: traced_component(component)})
@@ -211,17 +218,14 @@ def group(
         for item in strategies:
             own = with_numbers(item.planner, numbers_under("planner", point.own))
             planner = first.planner if own is None else traced_component(own)
-            settings.append(replace(first, strategy=item.flags(cutting), planner=planner, metrics=measured))
+            params.append(replace(first, strategy=item.flags(cutting), planner=planner, metrics=measured))
     different = list(dict.fromkeys(point.population for point in points))
     drawn = different == [PopulationConfig()]
     return Group(
-        kind=kind,
-        static=static,
-        walk=walk,
-        camera=camera,
+        **common._asdict(),
         points=tuple(point.index for point in points),
         strategies=tuple(item.name for item in strategies),
-        settings=stack(settings),
+        params=stack(params),
         populations=None if drawn else stack([population.traced() for population in different]),
         population_of=np.repeat([different.index(point.population) for point in points], len(strategies)),
         metrics=tuple(metrics),

@@ -49,7 +49,7 @@ LOST = (CancelledError, CommClosedError, OSError)  # what Dask raises when the s
 
 
 class Cluster:
-    """An engine of `conduct`: shards computed by the workers of a Dask scheduler.
+    """A way to compute the shards of `compute_study`: shards computed by the workers of a Dask scheduler.
 
     Args:
       client: a connected client. All its workers are checked now, those that join later with their first shard.
@@ -127,7 +127,7 @@ class Cluster:
 
     def submit(self, config: StudyConfig, group: Group, shard: Shard, topic: str) -> Future:
         """Submit a shard as a task."""
-        arguments = self.compute, config, group, shard, topic, self.versions, self.kind
+        arguments = self.compute, config, group, shard, topic, worker.Wanted(self.versions, self.kind)
         with self.connection():
             return self.client.submit(worker.work, *arguments, key=f"shard-{shard.number}-{topic}", pure=False)
 

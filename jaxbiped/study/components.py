@@ -7,8 +7,8 @@ from typing import TypeVar
 from jaxbiped.arenas.source import find_family
 from jaxbiped.core.code_hash import component_hash
 from jaxbiped.core.names import BUILT_IN_METRICS, STRATEGIES
+from jaxbiped.executors.execution import find_executor
 from jaxbiped.mission.config import EXECUTORS, SENSORS
-from jaxbiped.mission.execution import find_executor
 from jaxbiped.mission.metric import column_of, find_metric
 from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, find_strategy

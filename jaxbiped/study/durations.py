@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import nnls
 
-from jaxbiped.mission.library import LibraryConfig
+from jaxbiped.executors.motion_library import LibraryConfig
 from jaxbiped.motion.config import DurationConfig
 from jaxbiped.motion.grid_units import CELL
 from jaxbiped.motion.primitives import Command, Primitive, duration

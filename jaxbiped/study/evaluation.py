@@ -28,6 +28,7 @@ from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.metric_values import check_metrics, metric_columns
 from jaxbiped.study.rows import frame
 from jaxbiped.study.runner import batch_driver
+from jaxbiped.study.workload import Workload
 
 NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 
@@ -94,8 +95,9 @@ def compute(
     turns = None if len(kind.places) == kind.number else jnp.asarray(kind.turns(index))
     batch, seeds = draw(key, jnp.asarray(index), kind.families, group.populations, turns)
     check_metrics(batch, group, size)
+    workload = Workload(batch, seeds, group.params, count, group.spec, group.population_of)
     with batch_driver(group, workers or cores()) as play:
-        result = play(batch, seeds, group.settings, count, group.static, on_progress, population_of=group.population_of)
+        result = play(workload, on_progress)
     batch = jax.device_get(batch)  # slicing arrays on a device would be compiled, slice by slice
     plan = plan_all(batch, group, size)
     families = [kind.families[turn] for turn in kind.turns(index[:count])]
@@ -137,15 +139,15 @@ def plan_all(batch: Arena, group: Group, size: int) -> OraclePlan:
     """The oracle plans of all points [P * S] on the arenas [A] of their populations, all on the host."""
     kinds = len(group.population_of)
     out = OraclePlan(np.zeros((kinds, size), bool), *(np.zeros((kinds, size), np.float32) for _ in range(2)))
-    make = partial(oracle_plan, program=group.static)
+    make = partial(oracle_plan, spec=group.spec)
     if len(jax.local_devices()) > 1:
-        make = by_rows(oracle_plan, mesh_of(jax.local_devices()), shared=1, axis=1, program=group.static)
+        make = by_rows(oracle_plan, mesh_of(jax.local_devices()), shared=1, axis=1, spec=group.spec)
     for population in np.unique(group.population_of):
         mine = np.flatnonzero(group.population_of == population)
         arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
-        settings = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.settings)
+        params = jax.tree.map(lambda leaf, mine=mine: leaf[mine], group.params)
         several = POINTS if len(mine) == kinds else 1  # few of many populations have as many points
-        plan = jax.device_get(make(arenas, fill_up(settings, several)))
+        plan = jax.device_get(make(arenas, fill_up(params, several)))
         for rows, found in zip(jax.tree.leaves(out), jax.tree.leaves(plan), strict=True):
             rows[mine] = found[: len(mine)]
     return out

@@ -12,15 +12,15 @@ import numpy as np
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.config import field_docs
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.params import MissionConfig, MissionParams, mission_spec
 from jaxbiped.mission.sensor_rig import StereoRig, where
-from jaxbiped.mission.settings import MissionConfig, MissionParams, program
 from jaxbiped.sensing.camera import Mount
 from jaxbiped.sensing.config import CameraConfig, LandmarkConfig
 from jaxbiped.sensing.landmarks import sight
 from jaxbiped.sensing.presets import RayConfig, SensorConfig
 from jaxbiped.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
 from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
-from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, standing, with_rays
+from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, setup_in, standing, with_rays
 
 CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # where the lowest one that can be matched is searched
 CONTRAST_PLACES, CONTRAST_VIEWS = 3, 2
@@ -51,16 +51,16 @@ def fit(places: Sequence[Place], rig: StereoRig, config: MissionConfig, tell: Ca
       config: config of the missions; its own noise is the base, for what cannot be measured in pictures.
       tell: called after each view.
     """
-    settings = config.settings("full")
+    params = config.params("full")
     watched, sights, count = [], [], 0
     for place in places:
         count += len(place.poses)
-        sights += [one for n in range(len(place.poses)) for one in landmarks_of(place, n, rig, settings, config)]
+        sights += [one for n in range(len(place.poses)) for one in landmarks_of(place, n, rig, params, config)]
         bare = replace(place, arena=unmarked(place.arena))
         for n in range(len(place.poses)):
-            watched.append(watch_from(bare, n, rig, settings, config))
+            watched.append(watch_from(bare, n, rig, params, config))
             tell()
-    least, plain = least_contrast(places, rig, settings, config)
+    least, plain = least_contrast(places, rig, params, config)
     seen = together(watched)
     stereo = fit_noise(seen, config.stereo).model_copy(update={"min_contrast": round(least, 4)})
     marks = fit_landmarks(sights, config.landmarks)
@@ -96,33 +96,34 @@ def fewest_rays(places: Sequence[Place], rig: StereoRig, config: MissionConfig) 
 
 
 def eye(
-    place: Place, number: int, settings: MissionParams, config: MissionConfig
+    place: Place, number: int, params: MissionParams, config: MissionConfig
 ) -> tuple[np.ndarray, np.ndarray, Mount, int]:
     """The true and the believed camera pose in view `number` of a place, and the view's seed."""
-    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
+    setup = setup_in(place, params, mission_spec(config, AREA))
     seed = jnp.asarray(place.seed, jnp.uint32)[None]
-    world, mind = standing(*batch, seed, place.poses[number], jnp.int32(number), program(config, AREA))
-    origin, basis, at, drawn = jax.tree.map(lambda leaf: leaf[0], jax.device_get(where(world, mind, batch[1], None)))
+    world, agent = standing(setup, seed, place.poses[number], jnp.int32(number))
+    seen_from = jax.device_get(where(world, agent, setup.params, None))
+    origin, basis, at, drawn = jax.tree.map(lambda leaf: leaf[0], seen_from)
     return origin, basis, at, int(drawn)
 
 
-def watch_from(place: Place, number: int, rig: StereoRig, settings: MissionParams, config: MissionConfig) -> Watched:
+def watch_from(place: Place, number: int, rig: StereoRig, params: MissionParams, config: MissionConfig) -> Watched:
     """Evaluate the matcher in one view."""
-    origin, basis, _, seed = eye(place, number, settings, config)
+    origin, basis, _, seed = eye(place, number, params, config)
     rig.sensor.show(place.arena)
     return watch(rig.sensor, origin, basis, int(seed))
 
 
 def landmarks_of(
-    place: Place, number: int, rig: StereoRig, settings: MissionParams, config: MissionConfig
+    place: Place, number: int, rig: StereoRig, params: MissionParams, config: MissionConfig
 ) -> list[Sight]:
     """Landmarks in view of both cameras, found or not."""
     pose = place.poses[number]
-    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
+    setup = setup_in(place, params, mission_spec(config, AREA))
     seed = jnp.asarray(place.seed, jnp.uint32)[None]
-    world, mind = standing(*batch, seed, pose, jnp.int32(number), program(config, AREA))
-    _, found = rig.see(world, mind, *batch)
-    there = in_view(place.arena, pose, settings, config)
+    world, agent = standing(setup, seed, pose, jnp.int32(number))
+    _, found = rig.see(world, agent, setup)
+    there = in_view(place.arena, pose, params, config)
     sights = []
     for n in np.flatnonzero(there.seen):
         x, y = float(there.x[n]), float(there.y[n])
@@ -131,10 +132,10 @@ def landmarks_of(
     return sights
 
 
-def in_view(arena: Arena, pose: Pose, settings: MissionParams, config: MissionConfig):
+def in_view(arena: Arena, pose: Pose, params: MissionParams, config: MissionConfig):
     """Landmarks whose centres both cameras see, at any range."""
     return jax.device_get(
-        sight_all(arena, pose, settings.camera, NEVER_FURTHER.traced(), config.camera.image, jnp.uint32(0))
+        sight_all(arena, pose, params.camera, NEVER_FURTHER.traced(), config.camera.image, jnp.uint32(0))
     )
 
 
@@ -142,7 +143,7 @@ sight_all = jax.jit(sight, static_argnames=("image",))
 
 
 def least_contrast(
-    places: Sequence[Place], rig: StereoRig, settings: MissionParams, config: MissionConfig
+    places: Sequence[Place], rig: StereoRig, params: MissionParams, config: MissionConfig
 ) -> tuple[float, float]:
     """Contrast at which half as much is measured as at `CONTRASTS[-1]`; and the share that is measured at none."""
     shares = []
@@ -156,7 +157,7 @@ def least_contrast(
                 floor_contrast=np.float32(contrast),
             )
             for n in range(min(CONTRAST_VIEWS, len(place.poses))):
-                seen.append(watch_from(replace(place, arena=even), n, rig, settings, config))
+                seen.append(watch_from(replace(place, arena=even), n, rig, params, config))
         w = together(seen)
         shares.append(share(w.found > 0, w.common & ~w.near & w.inner))
     risen = np.maximum.accumulate(shares) + 1e-9 * np.arange(len(shares))

@@ -10,29 +10,22 @@ from contextlib import AbstractContextManager
 
 import jax
 import numpy as np
-from jaxtyping import Array, Int, UInt32
 
-from jaxbiped.arenas.arena import Arena
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, ending, no_results
 from jaxbiped.mission.metric import begun
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.sensor_rig import SensorRig, StereoRig
-from jaxbiped.mission.settings import MissionParams, MissionSpec
 from jaxbiped.sensing.config import CameraConfig
+from jaxbiped.study.workload import Workload
 
 
 @with_own_settings
 def run_on_host(
-    batch: Arena,
-    seeds: UInt32[Array, "A"],
-    points: MissionParams,
-    count: int,
-    static: MissionSpec,
+    workload: Workload,
     on_progress: OnProgress,
     open_rig: Callable[[], AbstractContextManager[SensorRig]],
-    population_of: Int[np.ndarray, "P"],
     workers: int = 2,
 ) -> Result:
     """As `queues.run_all`, for a sensor that measures on the host: each worker is a thread with its own rig.
@@ -44,9 +37,9 @@ def run_on_host(
       open_rig: creates a rig in the thread that uses it, and closes it there.
       workers: by default one for each core; OpenGL and OpenCV have additional threads.
     """
-    size, kinds = seeds.shape[0], jax.tree.leaves(points)[0].shape[0]
-    first = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (batch, points))
-    metrics = jax.eval_shape(lambda arena, settings: begun(settings.metrics, arena, settings), *first)
+    kinds, count = workload.kinds, workload.count
+    first = workload.setup_of(0, 0)
+    metrics = jax.eval_shape(lambda arena, params: begun(params.metrics, arena, params), first.arena, first.params)
     out, left = no_results(kinds, count, metrics=metrics), np.ndindex(count, kinds)
     done, lock, stop = Tally(0, 0), threading.Lock(), threading.Event()
 
@@ -60,16 +53,13 @@ def run_on_host(
                     job = next(left, None)
                 if job is None:
                     return
-                arena_number, point = job
-                arena, settings = (
-                    jax.tree.map(lambda leaf, row=row: leaf[row], tree)
-                    for tree, row in ((batch, size * population_of[point] + arena_number), (points, point))
-                )
-                world = jax.device_get(run_bare(arena, settings, seeds[arena_number], static, rig))
-                last = jax.device_get(ending(world, arena.goal_xy))
+                arena, point = job
+                setup = workload.setup_of(arena, point)
+                world = jax.device_get(run_bare(setup, workload.seeds[arena], rig))
+                last = jax.device_get(ending(world, setup.arena.goal_xy))
                 with lock:
                     for column, value in zip(jax.tree.leaves(out), jax.tree.leaves(last), strict=True):
-                        column[point, arena_number] = value[0]
+                        column[point, arena] = value[0]
                     done = done + Tally(1, int(world.code[0] == Code.REACHED))
                     on_progress(done)
 

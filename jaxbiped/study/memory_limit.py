@@ -9,7 +9,7 @@ from pathlib import Path
 from jaxbiped.core.sizes import JOBS, POINTS, filled
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import SLOTS
-from jaxbiped.mission.settings import MissionSpec
+from jaxbiped.mission.params import MissionSpec
 
 # Bytes, measured as growth of the resident memory, and rounded up.
 POINT = 25_000  # a sweep point: its config
@@ -32,25 +32,25 @@ def most_points(strategies: int) -> int:
     return memory() // (POINT + strategies * (SETTING + ROW))
 
 
-def map_bytes(static: MissionSpec, workers: int) -> int:
+def map_bytes(spec: MissionSpec, workers: int) -> int:
     """Bytes of the maps of all slots."""
-    height, width = static.spec.shape
-    layers = static.spec.levels + 4 + static.spec.ground_levels
+    height, width = spec.grid.shape
+    layers = spec.grid.levels + 4 + spec.grid.ground_levels
     return 4 * height * width * layers * SLOTS * workers * MAPS
 
 
-def check_memory(static: MissionSpec, points: int, strategies: int, arenas: int, workers: int) -> None:
+def check_memory(spec: MissionSpec, points: int, strategies: int, arenas: int, workers: int) -> None:
     """Raise `InputError` if a shard of `arenas` under `points` does not fit, saying what would.
 
     Args:
       points: of one group, all in one call; memory is counted for as many as their program is compiled for.
       workers: queues at once, each with its own maps.
     """
-    kinds, maps = points * strategies, map_bytes(static, workers)
+    kinds, maps = points * strategies, map_bytes(spec, workers)
     left = memory() - maps - points * POINT - filled(kinds, POINTS) * SETTING
     fit = jobs_that_fit(left, workers) // kinds
     if fit < 1:
-        size = f"{points} points x {strategies} strategies with maps of {static.spec.shape} cells"
+        size = f"{points} points x {strategies} strategies with maps of {spec.grid.shape} cells"
         least = memory() - left + workers * filled(-(-kinds // workers), JOBS) * ROW
         message = f"{size} need {least / 2**30:.1f} GiB, of {memory() / 2**30:.1f} available"
         raise InputError(f"{message}; sweep fewer points at once, or on a coarser pitch", field="axes")

@@ -15,7 +15,7 @@ from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import Result, no_results
 from jaxbiped.mission.metric import MissionEnd, begun, numbers_at_end
 from jaxbiped.mission.oracle import OraclePlan
-from jaxbiped.mission.settings import MissionParams
+from jaxbiped.mission.params import MissionParams
 from jaxbiped.study.batching import Group
 
 
@@ -39,11 +39,11 @@ def metric_columns(batch: Arena, group: Group, result: Result, plan: OraclePlan,
     for population in np.unique(group.population_of):
         mine = np.flatnonzero(group.population_of == population)
         arenas = jax.tree.map(lambda leaf, at=population * size: leaf[at : at + size], batch)
-        settings, ends, plans = (
-            jax.tree.map(lambda leaf, mine=mine: leaf[mine], tree) for tree in (group.settings, full, plan)
+        params, ends, plans = (
+            jax.tree.map(lambda leaf, mine=mine: leaf[mine], tree) for tree in (group.params, full, plan)
         )
         several = filled(len(mine), POINTS)
-        values = jax.device_get(at_ends(arenas, *(fill(tree, several) for tree in (settings, ends, plans))))
+        values = jax.device_get(at_ends(arenas, *(fill(tree, several) for tree in (params, ends, plans))))
         for row, k in enumerate(mine):
             found[k] = [(value[row, :count], valid[row, :count]) for value, valid in values]
     columns = {}
@@ -69,14 +69,14 @@ def check_metrics(batch: Arena, group: Group, size: int) -> None:
     if not group.metrics:
         return
     arenas = jax.tree.map(lambda leaf: leaf[:size], batch)
-    settings = jax.tree.map(lambda leaf: leaf[:1], group.settings)
-    kind = jax.tree.structure((arenas, settings)), *(np.shape(leaf) for leaf in jax.tree.leaves((arenas, settings)))
+    params = jax.tree.map(lambda leaf: leaf[:1], group.params)
+    kind = jax.tree.structure((arenas, params)), *(np.shape(leaf) for leaf in jax.tree.leaves((arenas, params)))
     if kind in CHECKED:
         return
-    one = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (arenas, settings))
-    states = jax.eval_shape(lambda arena, setting: begun(setting.metrics, arena, setting), *one)
+    one = (jax.tree.map(lambda leaf: leaf[0], tree) for tree in (arenas, params))
+    states = jax.eval_shape(lambda arena, params: begun(params.metrics, arena, params), *one)
     plan = OraclePlan(np.zeros((1, size), bool), *(np.zeros((1, size), np.float32) for _ in range(2)))
-    jax.eval_shape(at_ends, arenas, settings, no_results(1, size, metrics=states), plan)
+    jax.eval_shape(at_ends, arenas, params, no_results(1, size, metrics=states), plan)
     CHECKED.add(kind)
 
 
@@ -84,11 +84,11 @@ CHECKED: set = set()  # structures and shapes that have been checked
 
 
 @ready_jit
-def at_ends(arenas: Arena, settings: MissionParams, results: Result, plans: OraclePlan) -> tuple:
+def at_ends(arenas: Arena, params: MissionParams, results: Result, plans: OraclePlan) -> tuple:
     """(value, valid) [P, A] of each metric."""
 
-    def one(arena: Arena, setting: MissionParams, result: Result, plan: OraclePlan) -> tuple:
-        return numbers_at_end(setting.metrics, result.metrics, MissionEnd(arena, result, plan, setting))
+    def one(arena: Arena, params: MissionParams, result: Result, plan: OraclePlan) -> tuple:
+        return numbers_at_end(params.metrics, result.metrics, MissionEnd(arena, result, plan, params))
 
     over_arenas = jax.vmap(one, in_axes=(0, None, 0, 0))
-    return jax.vmap(over_arenas, in_axes=(None, 0, 0, 0))(arenas, settings, results, plans)
+    return jax.vmap(over_arenas, in_axes=(None, 0, 0, 0))(arenas, params, results, plans)

@@ -21,8 +21,8 @@ from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.config import EXECUTORS, SENSORS
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.recorded_driver import Mission
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.mission.strategies import Strategy, find_strategy
 from jaxbiped.statistics.comparison import paired
 from jaxbiped.statistics.schema import KNOWN
@@ -32,7 +32,7 @@ from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
 from jaxbiped.study.config import OF_COMPONENTS
 from jaxbiped.study.evaluation import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
-from jaxbiped.study.runner import check_mission, play_one, seeing
+from jaxbiped.study.runner import check_mission, numbered, play_one, seeing
 from jaxbiped.study.sweep import point_at
 
 
@@ -116,6 +116,7 @@ def play_again(
     populations = None if population == PopulationConfig() else stack([population.traced()])
     families = families_again(manifest, families)
     check_mission(config)
+    params = numbered(config.params(again), again, numbers)
     key, played = jax.random.key(manifest.seed), {}
     with seeing(config) as rig:
         for kind in kinds_of(families):
@@ -124,7 +125,7 @@ def play_again(
                 batch, seeds = draw(key, jnp.asarray(mine), kind.families, populations, jnp.asarray(kind.turns(mine)))
                 for row, k in enumerate(mine):
                     arena = jax.tree.map(lambda leaf, row=row: leaf[row], batch)
-                    played[int(k)] = play_one(arena, config, again, seeds[row], rig=rig, numbers=numbers)
+                    played[int(k)] = play_one(arena, config, params, seeds[row], rig=rig)
     return [played[int(k)] for k in arenas]
 
 

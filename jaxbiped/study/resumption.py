@@ -11,34 +11,22 @@ import polars as pl
 from jaxbiped import files
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
-from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.statistics.schema import validate
 from jaxbiped.study.lock import LOCK, FolderLock
 from jaxbiped.study.manifest import MANIFEST, UNREADABLE, Manifest, device, read_manifest, versions
 from jaxbiped.study.shard_files import ROWS, broken_shard, shard_number, shard_paths
-from jaxbiped.study.store import POINTS, Store, create
+from jaxbiped.study.store import POINTS, Store, StudyHeader, create
 
 SHOWN = 6  # most differing fields in a message
 ABSENT = "nothing"
 
 
-def resume(
-    folder: str | Path,
-    config: Model,
-    *,
-    seed: int,
-    arenas: int,
-    rows: Sequence[int],
-    points: pl.DataFrame | None = None,
-    device_name: str = "",
-    metrics: Mapping[str, MetricFormat] | None = None,
-) -> Store:
+def resume(folder: str | Path, header: StudyHeader, rows: Sequence[int]) -> Store:
     """A results folder open for writing the rest of a study; a new one if nothing was started there.
 
     Args:
+      header: as for `create`.
       rows: number of rows of each shard, by its number.
-      points, metrics: as for `create`.
-      device_name: where it will be computed; by default the devices that JAX sees here.
 
     Raises:
       InputError: the folder is finished, is being written, holds something else or a damaged shard, or was started
@@ -46,12 +34,11 @@ def resume(
     """
     folder = Path(folder)
     if not begun(folder):
-        made = {"points": points, "device_name": device_name, "metrics": metrics}
-        return create(folder, config, seed=seed, arenas=arenas, **made)
+        return create(folder, header)
     manifest = read_manifest(folder)
     refuse_finished(folder, manifest)
-    refuse_other_config(folder, manifest, config)
-    refuse_other_program(folder, manifest, device_name or device())
+    refuse_other_config(folder, manifest, header.config)
+    refuse_other_program(folder, manifest, header.device_name or device())
     lock = FolderLock(folder)
     try:
         manifest = read_manifest(folder)  # another process may have resumed it before we got the lock

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import polars as pl
@@ -16,8 +17,19 @@ from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluation import Progress, evaluate
 from jaxbiped.study.resumption import resume as take_up
 
-# Where shards are computed: called like `evaluate.evaluate`, that of this process. It chooses the order of shards.
-Engine = Callable[..., Iterator[tuple[Shard, pl.DataFrame]]]
+
+@dataclass(frozen=True)
+class Engine:
+    """How the shards of a study are computed."""
+
+    # Called like `evaluation.evaluate`, which computes in this process. It chooses the order of shards.
+    compute: Callable[..., Iterator[tuple[Shard, pl.DataFrame]]] = evaluate
+    device: str = ""  # its device, in words; "": that of this process
+    compile_time: Callable[[], float] | None = None  # [s] spent compiling so far; None: the time of this process
+    on_progress: Callable[[Progress], None] | None = None
+
+
+HERE = Engine()  # this process
 
 
 def never(frame: pl.DataFrame) -> bool:
@@ -25,16 +37,13 @@ def never(frame: pl.DataFrame) -> bool:
     return False
 
 
-def conduct(
+def compute_study(
     folder: str | Path,
     config: StudyConfig,
     *,
     points: Sequence[Point] | None = None,
     resume: bool = False,
-    on_progress: Callable[[Progress], None] | None = None,
-    engine: Engine = evaluate,
-    device: str = "",
-    compile_time: Callable[[], float] | None = None,
+    engine: Engine = HERE,
     enough: Callable[[pl.DataFrame], bool] = never,
 ) -> store.Manifest:
     """Compute a study and store it, shard by shard. A process that dies loses at most the current shard.
@@ -42,30 +51,34 @@ def conduct(
     Args:
       folder: must not exist or be empty; with `resume`, one where the same study was stopped, or none yet.
       points: sweep points; by default the one of `config`.
-      device: the engine's device, in words; by default that of this process.
-      compile_time: [s] that the engine has spent compiling so far; by default the time of this process.
       enough: called with each shard once, in order of their numbers; returns whether the study can end there.
 
     Raises:
       InputError: an unsuitable folder, or a full disk; stored shards stay readable.
     """
     clock, config = CompileClock(), fingerprinted(config)
-    compile_time = compile_time or (lambda: clock.seconds)
+    compile_time = engine.compile_time or (lambda: clock.seconds)
     swept = points is not None
     points = tuple(points) if swept else only_point(config)
     groups = groups_of(config, points)  # rejects invalid combinations before anything is written
-    kind = {"seed": config.seed, "arenas": config.arenas, "points": table(points) if swept else None}
-    kind["device_name"] = device
-    kind["metrics"] = {name: format_of(metric, name) for name, metric in metrics_of(config).items()}
+    header = store.StudyHeader(
+        config=config,
+        seed=config.seed,
+        arenas=config.arenas,
+        points=table(points) if swept else None,
+        device_name=engine.device,
+        metrics={name: format_of(metric, name) for name, metric in metrics_of(config).items()},
+    )
     if resume:
-        results = take_up(folder, config, rows=shard_rows(config, points, swept=swept), **kind)
+        results = take_up(folder, header, shard_rows(config, points, swept=swept))
     else:
-        results = store.create(folder, config, **kind)
+        results = store.create(folder, header)
     with results:
         judge = in_order(enough, parts=1 if swept else len(groups))
         paths = shard_files.shard_paths(results.folder) if enough is not never else []
         if not any(judge(shard_files.shard_number(path), pl.read_parquet(path)) for path in paths):
-            for shard, frame in engine(config, on_progress, points=points if swept else None, done=results.done()):
+            given = {"points": points if swept else None, "done": results.done()}
+            for shard, frame in engine.compute(config, engine.on_progress, **given):
                 results.append(frame, shard.number, compile_time=compile_time())
                 if judge(shard.number, frame):
                     break

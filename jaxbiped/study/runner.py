@@ -15,11 +15,12 @@ from jaxbiped.arenas.arena import Arena
 from jaxbiped.core.component import traced_component, with_numbers
 from jaxbiped.core.ready_programs import ready_jit
 from jaxbiped.mission.batched_driver import Result
+from jaxbiped.mission.params import SIMULATED, MissionConfig, MissionParams, MissionSpec
 from jaxbiped.mission.recorded_driver import Mission, Played, run_logged
 from jaxbiped.mission.sensor_rig import SensorRig, rig_for
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, MissionParams, MissionSpec
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.strategies import Strategy, find_strategy
-from jaxbiped.mission.terrain_check import program_for
+from jaxbiped.mission.terrain_check import checked_spec
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.study.batching import Group, numbers_under
 
@@ -35,9 +36,9 @@ def noise_of_word(seed: UInt32[Array, ""]) -> UInt32[Array, ""]:
     return from_key(jax.random.key(seed))
 
 
-def program_of(config: MissionConfig, arena: Arena) -> MissionSpec:
-    """The static part of missions in one arena; see `terrain_check.program_for`."""
-    return program_for(config, tuple(round(float(side), 6) for side in np.asarray(arena.size_xy)), arena.terrain)
+def spec_of(config: MissionConfig, arena: Arena) -> MissionSpec:
+    """The static part of missions in one arena; see `terrain_check.checked_spec`."""
+    return checked_spec(config, tuple(round(float(side), 6) for side in np.asarray(arena.size_xy)), arena.terrain)
 
 
 def check_mission(config: MissionConfig) -> None:
@@ -66,51 +67,49 @@ def seeing(config: MissionConfig) -> Iterator[SensorRig | None]:
 def play_one(
     arena: Arena,
     config: MissionConfig,
-    strategy: str | Strategy,
+    params: MissionParams,
     noise: UInt32[Array, ""],
     on_decision: Callable[[Played], None] = lambda _: None,
     rig: SensorRig | None = None,
-    numbers: Mapping[str, float] | None = None,
 ) -> Mission:
     """Play one mission as a study would, with a log of everything.
 
     Args:
+      params: those of the config for one strategy (`MissionConfig.params`, `numbered`).
       noise: seed of all its noise.
       rig: from `seeing`, if the sensor measures on the host.
-      numbers: numbers of components, instead of their defaults, such as `{"planner.clearance": 0.1}`.
 
     Raises:
       InputError: a pitch that does not divide the arena, a biped that cannot be simulated.
     """
-    settings = numbered(config.settings(strategy), strategy, numbers or {})
-    arguments = arena, settings, noise, program_of(config, arena)
+    setup = MissionSetup(arena, params, spec_of(config, arena))
     if config.executor in SIMULATED:
         from jaxbiped.mission.simulated_driver import walk_logged  # loads MuJoCo
 
-        return walk_logged(*arguments, config=config.walk, on_decision=on_decision, rig=rig)
-    return run_logged(*arguments, on_decision=on_decision, rig=rig)
+        return walk_logged(setup, noise, config.walk, on_decision, rig)
+    return run_logged(setup, noise, on_decision, rig)
 
 
-def numbered(settings: MissionParams, strategy: str | Strategy, numbers: Mapping[str, float]) -> MissionParams:
-    """Settings of a strategy with other numbers for its components."""
+def numbered(params: MissionParams, strategy: str | Strategy, numbers: Mapping[str, float]) -> MissionParams:
+    """Parameters of a strategy with other numbers for its components, such as `{"planner.clearance": 0.1}`."""
     strategy = find_strategy(strategy) if isinstance(strategy, str) else strategy
-    changed = {"sensor": settings.sensor, "executor": settings.executor, "planner": strategy.planner}
+    changed = {"sensor": params.sensor, "executor": params.executor, "planner": strategy.planner}
     for name, component in changed.items():
         own = numbers_under(name, numbers)
         if component is not None and own:
             made = traced_component(with_numbers(component, own))
-            settings = replace(settings, **{name: made})
-    return settings
+            params = replace(params, **{name: made})
+    return params
 
 
 @contextlib.contextmanager
 def batch_driver(group: Group, workers: int) -> Iterator[Callable[..., Result]]:
-    """What plays the missions of a group: a function with the arguments of `queues.run_all`."""
+    """What plays the missions of a group: a function with the first two arguments of `queues.run_all`."""
     from jaxbiped.study.hosted import open_rig, run_on_host
     from jaxbiped.study.queues import run_all
 
     with contextlib.ExitStack() as stack:
-        see = partial(open_rig, group.camera, group.static.localisation) if group.camera else None
+        see = partial(open_rig, group.camera, group.spec.localisation) if group.camera else None
         if group.walk is not None:
             from jaxbiped.study.walks import walk_all  # loads MuJoCo
 

@@ -14,16 +14,18 @@ from jaxtyping import Array, Bool, Float, Int8, UInt32
 from jaxbiped import mapping
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
 from jaxbiped.mission.mission_step import sense
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionConfig, MissionParams, MissionSpec, mission_spec
 from jaxbiped.mission.recorded_driver import run_bare
 from jaxbiped.mission.sensor_rig import SensorRig
-from jaxbiped.mission.settings import MissionConfig, MissionParams, MissionSpec, program
-from jaxbiped.mission.state import AgentState, WorldState, start
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import AgentState, start
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.view import View
 from jaxbiped.study.evaluation import draw
@@ -48,14 +50,14 @@ class Place:
 
 def worlds(seed: int, first: int, count: int, views: int, config: MissionConfig) -> Iterator[Place]:
     """Arenas of the population of `seed`, starting at `first`, and `views` places in each; the same for all sensors."""
-    spec, body = config.grid(AREA), config.robot.body()
+    grid, body = config.grid(AREA), config.robot.body()
     batch, seeds = draw(jax.random.key(seed), first + jnp.arange(count), FAMILIES)
-    truth = jax.jit(jax.vmap(lambda arena: truth_grid(arena, spec, body)))(batch)
+    truth = jax.jit(jax.vmap(lambda arena: truth_grid(arena, grid, body)))(batch)
     batch, seeds, truth = jax.device_get((batch, seeds, truth))
     for k in range(count):
         arena, (classes, levels) = jax.tree.map(lambda leaf, k=k: leaf[k], (batch, truth))
         rng = np.random.default_rng([seed, first + k])
-        poses = tuple(aimed(rng, arena, classes, levels, n, spec) for n in range(views))
+        poses = tuple(aimed(rng, arena, classes, levels, n, grid) for n in range(views))
         yield Place(arena, classes, levels, int(seeds[k]), poses)
 
 
@@ -65,14 +67,14 @@ def aimed(
     classes: Int8[np.ndarray, "H W"],
     levels: Int8[np.ndarray, "H W"],
     number: int,
-    spec: GridSpec,
+    grid: GridSpec,
 ) -> Pose:
     """A place on the ground from which view `number` looks at a lintel or a bump or, if there are none, at any box."""
     boxes = arena.boxes
     targets = np.flatnonzero(boxes.used & (boxes.overhead | (boxes.top < LOW)))
     others = np.flatnonzero(boxes.used)
     targets = targets if len(targets) and number % 3 else others
-    x, y, across = spec.size_x / 2, spec.size_y / 2, 0.0
+    x, y, across = grid.size_x / 2, grid.size_y / 2, 0.0
     if len(targets):
         x, y, across = (float(v[targets[number % len(targets)]]) for v in (boxes.x, boxes.y, boxes.yaw))
     for trial in range(TRIALS):
@@ -80,13 +82,13 @@ def aimed(
         sector = 0.3 if trial < TRIALS // 2 else np.pi  # otherwise from any side
         along = across + rng.choice([0, np.pi]) + rng.uniform(-sector, sector)
         px, py = x - away * np.cos(along), y - away * np.sin(along)
-        i, j = int(py // spec.pitch), int(px // spec.pitch)
-        if 0.1 < px < spec.size_x - 0.1 and 0.1 < py < spec.size_y - 0.1 and classes[i, j] in (Cell.FLOOR, Cell.BUMP):
+        i, j = int(py // grid.pitch), int(px // grid.pitch)
+        if 0.1 < px < grid.size_x - 0.1 and 0.1 < py < grid.size_y - 0.1 and classes[i, j] in (Cell.FLOOR, Cell.BUMP):
             break
     else:
         (px, py), along, (i, j) = arena.start_xyyaw[:2], float(arena.start_xyyaw[2]), (0, 0)
     yaw = along + rng.uniform(-0.2, 0.2)
-    return Pose(*(np.float32(v) for v in (px, py, levels[i, j] * spec.level_height, yaw)))
+    return Pose(*(np.float32(v) for v in (px, py, levels[i, j] * grid.level_height, yaw)))
 
 
 Look = Callable[[Place, Pose, int], View]
@@ -94,44 +96,47 @@ Look = Callable[[Place, Pose, int], View]
 
 def looking(config: MissionConfig, rig: SensorRig | None) -> Look:
     """The view of a robot at a known place: a function of the world, the place and the number of the view."""
-    settings, static = config.settings("full"), program(config, AREA)
-    measure = rig.see if rig else partial(measured, program=static)
+    params, spec = config.params("full"), mission_spec(config, AREA)
+    measure = rig.see if rig else measured
 
     def look(world: Place, pose: Pose, number: int) -> View:
-        batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (world.arena, settings))
-        place, mind = standing(*batch, jnp.asarray(world.seed, jnp.uint32)[None], pose, jnp.int32(number), static)
-        view, _ = measure(place, mind, *batch)
+        setup = setup_in(world, params, spec)
+        place, agent = standing(setup, jnp.asarray(world.seed, jnp.uint32)[None], pose, jnp.int32(number))
+        view, _ = measure(place, agent, setup)
         return jax.tree.map(lambda leaf: leaf[0], view)
 
     return look
 
 
+def setup_in(place: Place, params: MissionParams, spec: MissionSpec) -> MissionSetup:
+    """A mission in the arena of a place, with a leading axis of 1."""
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], MissionSetup(place.arena, params, spec))
+
+
 @with_own_settings
-@partial(jax.jit, static_argnames=("program",))
-def measured(world: WorldState, mind: AgentState, arena: Arena, settings: MissionParams, program: MissionSpec):
+@jax.jit
+def measured(world: WorldState, agent: AgentState, setup: MissionSetup):
     """The measurement of a sensor that is in JAX."""
-    return jax.vmap(partial(sense, program=program, carriage=None))(world, mind, arena, settings)
+    return jax.vmap(partial(sense, body_pose=None))(world, agent, setup)
 
 
 @with_own_settings
-@partial(jax.jit, static_argnames=("program",))
-def standing(
-    arena: Arena, settings: MissionParams, seed: UInt32[Array, "1"], pose: Pose, number: Array, program: MissionSpec
-) -> tuple[WorldState, AgentState]:
+@jax.jit
+def standing(setup: MissionSetup, seed: UInt32[Array, "1"], pose: Pose, number: Array) -> tuple[WorldState, AgentState]:
     """A robot that stands at a pose and knows it, before its measurement of this number."""
-    world, mind = jax.vmap(start, in_axes=(0, 0, 0, None))(arena, settings, seed, program.spec)
+    world, agent = jax.vmap(start)(setup, seed)
     pose = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], pose)
-    return replace(world, pose=pose, decisions=number[None]), replace(mind, belief=replace(mind.belief, pose=pose))
+    return replace(world, pose=pose, decisions=number[None]), replace(agent, belief=replace(agent.belief, pose=pose))
 
 
 @with_own_settings
 def fused(world: Place, look: Look, config: MissionConfig) -> tuple[Int8[np.ndarray, "H W"], Int8[np.ndarray, "H W"]]:
     """Classes and levels of the map of all views of a world, each from its known place."""
-    spec, settings = config.grid(AREA), config.settings("full")
-    grid_map = mapping.empty(spec)
+    grid, params = config.grid(AREA), config.params("full")
+    grid_map = mapping.empty(grid)
     for number, pose in enumerate(world.poses):
-        grid_map = add(grid_map, look(world, pose, number), pose, settings.body, settings.mapping, spec)
-    return jax.device_get(mapping.classify(grid_map, settings.mapping, spec))
+        grid_map = add(grid_map, look(world, pose, number), pose, params.body, params.mapping, grid)
+    return jax.device_get(mapping.classify(grid_map, params.mapping, grid))
 
 
 def with_rays(config: MissionConfig, rays: RayConfig) -> MissionConfig:
@@ -161,8 +166,8 @@ class Outcome:
 @with_own_settings
 def mission(world: Place, config: MissionConfig, rig: SensorRig | None) -> Outcome:
     """One mission of strategy `full` in a world."""
-    arena, settings = jax.tree.map(jnp.asarray, (world.arena, config.settings("full")))
-    end = run_bare(arena, settings, jnp.uint32(world.seed), program(config, AREA), rig)
+    arena, params = jax.tree.map(jnp.asarray, (world.arena, config.params("full")))
+    end = run_bare(MissionSetup(arena, params, mission_spec(config, AREA)), jnp.uint32(world.seed), rig)
     return Outcome(Code(int(end.code[0])), float(end.distance[0]), float(end.time[0]))
 
 

@@ -15,6 +15,7 @@ import io
 import re
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,6 +40,19 @@ class StoredRows(NamedTuple):
 
     rows: pl.DataFrame  # of `schema.SCHEMA`, sorted by sweep point, arena and strategy
     manifest: Manifest
+
+
+@dataclass(frozen=True)
+class StudyHeader:
+    """What a results folder says about its study before it has any rows."""
+
+    config: Model  # resolved; its values and its hash are stored
+    seed: int
+    arenas: int
+    points: pl.DataFrame | None = None  # of a sweep: `point`, and a column for each field
+    command: str | None = None  # the command line; None: this process's
+    device_name: str = ""  # where it is computed; "": the devices that JAX sees
+    metrics: Mapping[str, MetricFormat] | None = None  # how the numbers in the columns of metrics are displayed
 
 
 class Store:
@@ -123,39 +137,24 @@ class Store:
                 remove_if_empty(self.folder)
 
 
-def create(
-    folder: str | Path,
-    config: Model,
-    *,
-    seed: int,
-    arenas: int,
-    points: pl.DataFrame | None = None,
-    command: str | None = None,
-    device_name: str = "",
-    metrics: Mapping[str, MetricFormat] | None = None,
-) -> Store:
+def create(folder: str | Path, header: StudyHeader) -> Store:
     """Create a results folder: take its lock, write its sweep points and its manifest.
 
     Args:
       folder: must not exist, or be empty.
-      config: the resolved configuration; its values and its hash are stored.
-      points: points of a sweep: `point`, and a column for each field.
-      command: the command line; by default this process's.
-      device_name: by default the devices that JAX sees.
-      metrics: how the numbers in the columns of metrics are displayed.
     """
     folder = Path(folder)
     refuse_filled(folder)
     manifest = Manifest(
         state="running",
-        command=command if command is not None else command_line(),
-        config=config.model_dump(mode="json"),
-        config_hash=config_hash(config),
+        command=header.command if header.command is not None else command_line(),
+        config=header.config.model_dump(mode="json"),
+        config_hash=config_hash(header.config),
         versions=versions(),
-        device=device_name or device(),
-        seed=seed,
-        arenas=arenas,
-        metrics=dict(metrics or {}),
+        device=header.device_name or device(),
+        seed=header.seed,
+        arenas=header.arenas,
+        metrics=dict(header.metrics or {}),
         started=datetime.now(UTC).isoformat(timespec="seconds"),
     )
     made = not folder.exists()
@@ -174,8 +173,8 @@ def create(
     store = Store(folder, manifest, lock, made)
     try:
         (folder / ROWS).mkdir()
-        if points is not None:
-            write_points(folder, points)
+        if header.points is not None:
+            write_points(folder, header.points)
         store.write_manifest()
     except (OSError, InputError) as error:
         store.close()

@@ -124,7 +124,7 @@ def point_at(
     Args:
       size_xy: [m] size of all arenas, which its pitch must divide; None: check this when they are known.
     """
-    from jaxbiped.mission.settings import program
+    from jaxbiped.mission.params import mission_spec
     from jaxbiped.study.batching import Point
 
     own = {}
@@ -138,7 +138,7 @@ def point_at(
     kind = validated(MissionConfig, mission, values)
     try:
         if size_xy is not None:
-            program(kind, size_xy)
+            mission_spec(kind, size_xy)
     except InputError as error:
         raise InputError(f"{shown(values)}: {error}", field="axes") from None
     drawn = validated(PopulationConfig, population, values, f"{POPULATION}.")

@@ -13,13 +13,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.devices import cores
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig, MissionParams, program
+from jaxbiped.mission.params import MissionConfig, mission_spec
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.planning import Costs
 from jaxbiped.study.evaluation import draw
 
@@ -53,9 +53,9 @@ class Trials:
         Args:
           on_progress: called from time to time with the tally of the missions so far.
         """
-        static = program(self.mission, (SIZE_X, SIZE_Y))
-        base = self.mission.settings(self.strategy)
-        settings = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (VECTORS, *jnp.shape(leaf))), base)
+        spec = mission_spec(self.mission, (SIZE_X, SIZE_Y))
+        base = self.mission.params(self.strategy)
+        params = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (VECTORS, *jnp.shape(leaf))), base)
         key, length = jax.random.key(self.seed), VECTORS * BLOCK
         pieces = list(itertools.product(range(0, len(index), BLOCK), range(0, len(costs), VECTORS)))
         out = jax.tree.map(lambda leaf: leaf.astype(f"{leaf.dtype.kind}4"), no_results(len(costs), len(index)))
@@ -65,16 +65,17 @@ class Trials:
             if stop.is_set():
                 raise InterruptedError
 
-        def deal(piece: tuple[int, int]) -> tuple[Work, tuple[Arena, MissionParams, Jobs], tuple[slice, slice]]:
+        def deal(piece: tuple[int, int]) -> tuple[Work, tuple[MissionSetup, Jobs], tuple[slice, slice]]:
             first, vector = piece
             here, vectors = index[first : first + BLOCK], costs[vector : vector + VECTORS]
             batch, seeds = draw(key, jnp.asarray(np.resize(here, BLOCK)), self.families)
             columns = np.resize(vectors, (VECTORS, 5)).T.astype(np.float32)
-            points = replace(settings, costs=Costs(*(jnp.asarray(column) for column in columns)))
+            points = replace(params, costs=Costs(*(jnp.asarray(column) for column in columns)))
             arena, point = np.arange(length) % len(here), np.arange(length) // len(here) % len(vectors)
             jobs = Jobs(jnp.asarray(arena), jnp.asarray(point), seeds[arena], jnp.int32(len(here) * len(vectors)))
             place = slice(vector, vector + len(vectors)), slice(first, first + len(here))
-            return compile_queue(batch, points, jobs, static, SLOTS), (batch, points, jobs), place
+            setup = MissionSetup(batch, points, spec)
+            return compile_queue(setup, jobs, SLOTS), (setup, jobs), place
 
         def play(piece: tuple[int, int]) -> None:
             work, dealt, place = deal(piece)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from jaxbiped.mission.batched_driver import OnProgress, Result, Tally, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import CostConfig, MissionConfig
+from jaxbiped.mission.params import CostConfig, MissionConfig
 from jaxbiped.statistics.intervals import Estimate, mean_and_median
 from jaxbiped.statistics.paired import PairedMetric, metric_difference, success_difference
 from jaxbiped.study.durations import fit
@@ -99,9 +99,9 @@ def tune(
     result = run(np.array(list(costs.values())), test)
     seconds = objective(result, config.penalty)
     gaps = tuple(
-        gap(first, second, *(list(costs).index(name) for name in (first, second)), result, seconds, config.seed)
-        for first, second in PAIRS
-        if {first, second} <= set(costs)
+        gap(pair, [list(costs).index(name) for name in pair], result, seconds, config.seed)
+        for pair in PAIRS
+        if set(pair) <= set(costs)
     )
     return Tuning(costs, history, swept, tested(config, tuple(costs), test, result, seconds), gaps)
 
@@ -163,13 +163,16 @@ def spread_out(
     return pl.DataFrame(columns | {"success": (result.code == Code.REACHED).mean(1)})
 
 
-def gap(first: str, second: str, f: int, s: int, result: Result, seconds: Float[np.ndarray, "P A"], seed: int) -> Gap:
-    """Compare rows `f` and `s` of the results. `seed` seeds the bootstraps."""
+def gap(
+    pair: tuple[str, str], rows: Sequence[int], result: Result, seconds: Float[np.ndarray, "P A"], seed: int
+) -> Gap:
+    """Compare two cost vectors by their rows of the results. `seed` seeds the bootstraps."""
+    f, s = rows
     reached = result.code == Code.REACHED
     both = reached[f] & reached[s]
     mean, _ = mean_and_median(np.round(seconds[f] - seconds[s], 4), seed=seed)
     time = metric_difference(*(result.time[k, both].astype(float) for k in (f, s)), seed=seed)
-    return Gap(first, second, mean, success_difference(reached[f], reached[s]), time)
+    return Gap(*pair, mean, success_difference(reached[f], reached[s]), time)
 
 
 def tested(

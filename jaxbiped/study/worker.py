@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from functools import cache
+from typing import NamedTuple
 
 import jax
 import polars as pl
@@ -23,6 +24,13 @@ PAUSE = 1.0  # [s] between two progress reports of a shard
 ONE_AT_A_TIME = threading.Lock()
 
 Compute = Callable[..., pl.DataFrame]
+
+
+class Wanted(NamedTuple):
+    """What a worker must have."""
+
+    versions: Mapping[str, str | None]
+    device_kind: str
 
 
 def versions() -> dict[str, str | None]:
@@ -70,22 +78,21 @@ def work(
     group: Group,
     shard: Shard,
     topic: str,
-    wanted: Mapping[str, str | None],
-    kind: str,
+    wanted: Wanted,
 ) -> tuple[pl.DataFrame, str, float]:
     """The task: return the rows of a shard, the worker's address, and the seconds that it spent compiling.
 
     Args:
       compute: as `evaluate.compute`.
       topic: topic of the progress events: (shard number, missions ended, of these reached).
-      wanted, kind: versions and kind of device that a worker must have.
+      wanted: what this worker must have.
 
     Raises:
       InputError: this worker has other ones.
     """
     worker = get_worker()
-    refuse_other_versions(worker.address, versions(), wanted)
-    refuse_other_device(worker.address, devices()[1], kind)
+    refuse_other_versions(worker.address, versions(), wanted.versions)
+    refuse_other_device(worker.address, devices()[1], wanted.device_kind)
     last = [time.monotonic()]
 
     def report(tally: Tally) -> None:

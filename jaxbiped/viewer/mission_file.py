@@ -10,8 +10,8 @@ from typing import Any
 from jaxbiped.config import parse
 from jaxbiped.errors import InputError
 from jaxbiped.mission.log import MissionLog
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.recording import load_log
-from jaxbiped.mission.settings import MissionConfig
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import generate
 from jaxbiped.biped.request import Request
 from jaxbiped.errors import InputError
+from jaxbiped.executors.primitive_schedule import Move, requests
 from jaxbiped.mission.log import MissionLog
-from jaxbiped.mission.primitive_schedule import Move, requests
 from jaxbiped.mission.recorded_driver import NAMES
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.viewer.puppet import Puppet

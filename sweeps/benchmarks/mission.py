@@ -34,27 +34,30 @@ from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.core.names import STRATEGIES
 from jaxbiped.devices import cores
+from jaxbiped.executors.kinematic_executor import kinematic
 from jaxbiped.mission import decision
 from jaxbiped.mission.batched_driver import SLOTS, stack
-from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.mission_step import apply_outcome, sense, step
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.params import MissionConfig, mission_spec
+from jaxbiped.mission.route import nearest_direction
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.evaluation import draw, evaluate
 from jaxbiped.study.queues import run_all
+from jaxbiped.study.workload import Workload
 from tests.reference import mission as reference
 
 CONFIG = MissionConfig()
-PROGRAM = program(CONFIG, (SIZE_X, SIZE_Y))
+SPEC = mission_spec(CONFIG, (SIZE_X, SIZE_Y))
 MISSIONS = 2400  # that the compiled side is timed on, at least
 
 
 def points():
-    """All strategies' settings, [P]."""
-    return stack([CONFIG.settings(name) for name in STRATEGIES])
+    """All strategies' parameters, [P]."""
+    return stack([CONFIG.params(name) for name in STRATEGIES])
 
 
 def row(tree, index):
@@ -66,22 +69,22 @@ def compiled_side(arenas: int):
     """A function that works off the list of missions, several times over: results [P, arenas * copies]."""
     copies = -(-MISSIONS // (arenas * len(STRATEGIES)))
     batch, seeds = draw(jax.random.key(0), jnp.tile(jnp.arange(arenas), copies), FAMILIES)
-    settings = points()
-    return lambda: run_all(batch, seeds, settings, len(seeds), PROGRAM, lambda ended: None)
+    workload = Workload(batch, seeds, points(), len(seeds), SPEC)
+    return lambda: run_all(workload, lambda ended: None)
 
 
 def play_one(arena, setting, seed):
     """One mission of the reference: code, decisions, CPU seconds."""
     begin = time.process_time()
-    mission = reference.run(arena, setting, seed, PROGRAM)
+    mission = reference.run(arena, setting, seed, SPEC)
     return mission.code, mission.decisions, time.process_time() - begin
 
 
 def missions_of(arenas: int):
-    """The list of missions: arena, settings, seed; strategy by strategy."""
+    """The list of missions: arena, parameters, seed; strategy by strategy."""
     batch, seeds = jax.device_get(draw(jax.random.key(0), jnp.arange(arenas), FAMILIES))
-    settings = points()
-    return [(row(batch, k), row(settings, p), seeds[k]) for p in range(len(STRATEGIES)) for k in range(arenas)]
+    params = points()
+    return [(row(batch, k), row(params, p), seeds[k]) for p in range(len(STRATEGIES)) for k in range(arenas)]
 
 
 def pool_of_references():
@@ -101,24 +104,22 @@ def parts(repeats: int = 20):
     """Print microseconds a decision of each part, on one full set of slots in the middle of its missions."""
     batch, seeds = draw(jax.random.key(0), jnp.arange(SLOTS), FAMILIES)
     setting = jax.tree.map(lambda leaf: jnp.asarray(leaf)[jnp.arange(SLOTS) % len(STRATEGIES)], points())
-    world, mind = jax.vmap(partial(start, spec=PROGRAM.spec))(batch, setting, seeds)
-    turn = jax.jit(partial(step, program=PROGRAM))
+    setup = MissionSetup(batch, setting, SPEC)
+    world, agent = jax.vmap(start)(setup, seeds)
+    turn = jax.jit(step)
     for _ in range(6):
-        world, mind, *_ = turn(world, mind, batch, setting)
-    spec, blind = PROGRAM.spec, setting.strategy.blind
-    costs, rules = setting.costs.at_pitch(spec.pitch), setting.strategy.rules()
+        world, agent, *_ = turn(world, agent, setup)
+    grid = SPEC.grid
+    costs, rules = setting.costs.at_pitch(grid.pitch), setting.strategy.rules()
 
-    def plan(classes, levels, ij, goal_ij, yaw):
-        cost = planning.field(classes, levels, costs, rules, goal_ij).cost
-        heading = jax.vmap(decision.nearest_direction)(yaw)
-        return planning.next_step(cost, classes, levels, costs, rules, ij, heading)
+    def plan(local, goal_ij):
+        cost = planning.field(local.classes, local.levels, costs, rules, goal_ij).cost
+        heading = jax.vmap(nearest_direction)(local.pose.yaw)
+        return planning.next_step(cost, local.classes, local.levels, costs, rules, local.ij, heading)
 
-    choose = jax.vmap(partial(decision.choose, program=PROGRAM))
-
-    def execute(world, mind, command, verdict):
+    def execute(world, agent, command, verdict):
         done = jax.vmap(kinematic)(batch, world, command, setting)
-        ended = jax.vmap(partial(apply_outcome, program=PROGRAM))(world, mind, command, verdict, done, batch, setting)
-        return ended
+        return jax.vmap(apply_outcome)(world, agent, command, verdict, done, setup)
 
     def part(name, function, *arguments):
         run = jax.jit(function)
@@ -128,18 +129,16 @@ def parts(repeats: int = 20):
         return result
 
     print(f"parts, {SLOTS} missions at once, each alone, in memory that is new at each call:")
-    measure = jax.vmap(partial(sense, program=PROGRAM, carriage=None))
-    view, sightings = part("sense", measure, world, mind, batch, setting)
-    perceive = partial(decision.perceive, program=PROGRAM)
-    mind, classes, levels, ij = part("map", perceive, mind, view, sightings, batch, setting)
-    goal_ij = jax.vmap(partial(goal_cell, spec=spec))(
-        batch.goal_xy, setting.limits.goal_radius, classes, setting.strategy.rules()
+    measure = jax.vmap(partial(sense, body_pose=None))
+    view, sightings = part("sense", measure, world, agent, setup)
+    agent, local = part("map", decision.perceive, agent, view, sightings, setup)
+    goal_ij = jax.vmap(partial(goal_cell, grid=grid))(
+        batch.goal_xy, setting.limits.goal_radius, local.classes, setting.strategy.rules()
     )
-    moves = part("plan", plan, classes, levels, ij, goal_ij, mind.belief.pose.yaw)
-    arguments = (mind, view, ij, goal_ij, moves, classes, levels, blind, setting)
-    mind, command, verdict = part("select", choose, *arguments)
-    part("execute", execute, world, mind, command, verdict)
-    part("all", partial(step, program=PROGRAM), world, mind, batch, setting)
+    moves = part("plan", plan, local, goal_ij)
+    agent, command, verdict = part("select", jax.vmap(decision.choose), agent, view, local, goal_ij, moves, setup)
+    part("execute", execute, world, agent, command, verdict)
+    part("all", step, world, agent, setup)
 
 
 def reference_parts(arenas: int = 6) -> None:
@@ -220,7 +219,7 @@ def sweep(vectors: int = 64, arenas: int = 8) -> None:
     events = []
     jax.monitoring.register_event_duration_secs_listener(lambda event, *_, **__: events.append(event))
     batch, seeds = draw(jax.random.key(0), jnp.arange(arenas), FAMILIES)
-    rng, setting, seen = np.random.default_rng(0), CONFIG.settings("full"), set()
+    rng, setting, seen = np.random.default_rng(0), CONFIG.params("full"), set()
 
     def counted():
         return tuple(sum(kind in event for event in events) for kind in ("jaxpr_trace", "backend_compile"))
@@ -228,7 +227,7 @@ def sweep(vectors: int = 64, arenas: int = 8) -> None:
     for k in range(vectors + 1):
         costs = planning.Costs(*(jnp.float32(c) for c in rng.uniform(0.1, 30, 5)))
         point = stack([replace(setting, costs=costs)])
-        result = run_all(batch, seeds, point, arenas, PROGRAM, lambda ended: None)
+        result = run_all(Workload(batch, seeds, point, arenas, SPEC), lambda ended: None)
         seen.add(float(result.time.sum()))
         if k == 0:
             warm = counted()

@@ -26,8 +26,8 @@ from statsmodels.stats.proportion import proportion_confint
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.localisation.kalman_filter import Belief, correct
 from jaxbiped.mapping import Cell
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.sensor_rig import StereoRig
-from jaxbiped.mission.settings import MissionConfig, program
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.stereo import landmarks, matching
@@ -43,6 +43,7 @@ from jaxbiped.study.sensors import (
     mission,
     same,
     score,
+    setup_in,
     standing,
     with_rays,
     worlds,
@@ -60,11 +61,11 @@ update = jax.jit(correct)
 
 def matcher(places, rig, config) -> None:
     """Disparities of textured and of plain surfaces against the renderer's depth."""
-    settings = config.settings("full")
+    params = config.params("full")
     bare = [replace(place, arena=unmarked(place.arena)) for place in places]
-    watched = [watch_from(place, n, rig, settings, config) for place in bare for n in range(len(place.poses))]
+    watched = [watch_from(place, n, rig, params, config) for place in bare for n in range(len(place.poses))]
     q = quality(together(watched))
-    _, plain = least_contrast(places, rig, settings, config)
+    _, plain = least_contrast(places, rig, params, config)
     print(f"matcher   bias {q.bias:+.3f} px (wanted: below 0.1), {q.measured:.3f} of what both cameras see measured "
           f"(0.85), {q.wrong:.4f} of that beyond 1 px; {plain:.4f} of plain surfaces measured (none)")  # fmt: skip
 
@@ -121,18 +122,18 @@ def gates(found, true) -> None:
 
 def poses(places, rig, config) -> None:
     """Poses of robots that are a little lost, after one view with two or more landmarks."""
-    settings, static = config.settings("full"), program(config, AREA)
+    params, spec = config.params("full"), mission_spec(config, AREA)
     rng = np.random.default_rng(0)
     off, views = [], 0
     for place in places:
-        batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (place.arena, settings))
+        setup = setup_in(place, params, spec)
         for n, pose in enumerate(place.poses):
             seed = jnp.asarray(place.seed, jnp.uint32)[None]
-            world, mind = standing(*batch, seed, pose, jnp.int32(n), static)
+            world, agent = standing(setup, seed, pose, jnp.int32(n))
             error = rng.normal(0, LOST).astype(np.float32)
             lost = replace(pose, x=pose.x + error[0], y=pose.y + error[1], yaw=pose.yaw + error[2])
             lost = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], lost)
-            _, found = rig.see(world, replace(mind, belief=replace(mind.belief, pose=lost)), *batch)
+            _, found = rig.see(world, replace(agent, belief=replace(agent.belief, pose=lost)), setup)
             views += 1
             if found.seen.sum() >= 2:
                 belief = Belief(jax.tree.map(lambda leaf: leaf[0], lost), jnp.diag(jnp.square(jnp.array(LOST))))
@@ -201,13 +202,13 @@ def ending_alike(first, second, lost: bool = True) -> str:
 
 def speed(place, rig, config) -> None:
     """Time of one measurement, by its parts."""
-    sensor, settings = rig.sensor, config.settings("full")
-    origin, basis, at, seed = eye(place, 0, settings, config)
+    sensor, params = rig.sensor, config.params("full")
+    origin, basis, at, seed = eye(place, 0, params, config)
     sensor.show(place.arena)
     pair = sensor.renderer.pair(origin, basis, sensor.camera.image_noise, int(seed))
     grey = [matching.grey(image) for image in (pair.left, pair.right)]
     disparity = sensor.match(pair)
-    believed, spread = place.poses[0], jax.device_get(settings.landmarks)
+    believed, spread = place.poses[0], jax.device_get(params.landmarks)
     parts = {
         "rendering and noise": lambda: sensor.renderer.pair(origin, basis, sensor.camera.image_noise, 1),
         "OpenCV's matcher": lambda: matching.search(*grey, sensor.params),
@@ -237,12 +238,12 @@ def speed(place, rig, config) -> None:
 
 def flight(places, config) -> None:
     """Measurements of missions that are played at once, a thread each, as a study plays them."""
-    settings, begin = config.settings("full"), threading.Barrier(len(places) + 1)
+    params, begin = config.params("full"), threading.Barrier(len(places) + 1)
 
     def measure(place) -> None:
         with contextlib.closing(StereoRig(config.camera)) as rig:
-            origin, basis, at, seed = eye(place, 0, settings, config)
-            rest = at, place.poses[0], 2.0, jax.device_get(settings.landmarks)
+            origin, basis, at, seed = eye(place, 0, params, config)
+            rest = at, place.poses[0], 2.0, jax.device_get(params.landmarks)
             rig.sensor(place.arena, origin, basis, *rest, seed)
             begin.wait()
             for n in range(REPEATS):

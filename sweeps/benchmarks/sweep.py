@@ -81,8 +81,8 @@ def main() -> None:
     points = tuple(config.points())
     with tempfile.TemporaryDirectory() as place:
         begin, begin_cpu = time.perf_counter(), time.process_time()
-        kind = {"seed": 0, "arenas": config.arenas, "points": table(points)}
-        with store.create(Path(place) / "r", config, **kind) as results:
+        header = store.StudyHeader(config, seed=0, arenas=config.arenas, points=table(points))
+        with store.create(Path(place) / "r", header) as results:
             append = writing.timed(results.append)
             for shard, frame in evaluation.evaluate(config, points=points):
                 append(frame, shard.number, compile_time=0.0)

@@ -14,7 +14,7 @@ import jaxbiped as jb
 class TurnedAngle(jb.Metric):
     unit = "rad"
 
-    def start(self, arena, settings):
+    def start(self, arena, params):
         return jnp.zeros(())
 
     def update(self, state, step):

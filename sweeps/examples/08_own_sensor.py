@@ -14,8 +14,8 @@ import jaxbiped as jb
 class ShortSighted(jb.RayCast):
     reach: float = 1.0  # [m]
 
-    def measure(self, arena, at, settings, program):
-        view = super().measure(arena, at, settings, program)
+    def measure(self, arena, at, params, spec):
+        view = super().measure(arena, at, params, spec)
         return replace(view, weight=jnp.where(jnp.hypot(view.x, view.y) < self.reach, view.weight, 0.0))
 
 

@@ -14,8 +14,8 @@ import jaxbiped as jb
 class Slippery(jb.Kinematic):
     chance: float = 0.05  # of a fall, in a step up or down
 
-    def execute(self, arena, world, command, settings):
-        done = super().execute(arena, world, command, settings)
+    def execute(self, arena, world, command, params):
+        done = super().execute(arena, world, command, params)
         key = jax.random.fold_in(jax.random.key(world.seed), world.decisions)
         slips = (command.rise != 0) & (jax.random.uniform(key) < self.chance)
         return replace(done, fell=done.fell | (slips & ~done.collided), time=jnp.where(slips, 0.0, done.time))

@@ -23,13 +23,14 @@ from rich.table import Table
 from jaxbiped.arenas import load_scene
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import SIMULATED, MissionConfig, mission_spec
 from jaxbiped.mission.sensor_rig import RENDERED
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.reproduction import EXPERIMENTS, Experiment
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.study.hosted import open_rig, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
+from jaxbiped.study.workload import Workload
 
 SCENES = Path(__file__).parents[2] / "configs" / "scenes"
 
@@ -37,20 +38,18 @@ SCENES = Path(__file__).parents[2] / "configs" / "scenes"
 def play(item: Experiment, config: MissionConfig, seeds: int):
     """All missions of one experiment, at once: `Result` with leaves [seeds]."""
     _, arena = load_scene(SCENES / f"{item.scene}.toml")
-    static = program(config, tuple(round(float(v), 6) for v in arena.size_xy))
+    spec = mission_spec(config, tuple(round(float(v), 6) for v in arena.size_xy))
     batch = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (seeds, *jnp.shape(leaf))), arena)
     noise = jnp.stack([from_key(jax.random.key(seed)) for seed in range(seeds)])
-    points = stack([config.settings(item.strategy)])
-    arguments = batch, noise, points, seeds, static, lambda _: None
-    one = np.zeros(1, int)
+    workload = Workload(batch, noise, stack([config.params(item.strategy)]), seeds, spec)
     see = partial(open_rig, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
         with see() if see else contextlib.nullcontext() as rig:
-            result = walk_all(*arguments, config.walk, population_of=one, rig=rig)
+            result = walk_all(workload, lambda _: None, config.walk, rig)
     elif see:
-        result = run_on_host(*arguments, see, population_of=one)
+        result = run_on_host(workload, lambda _: None, see)
     else:
-        result = run_all(*arguments, workers=1, slots=seeds)
+        result = run_all(workload, lambda _: None, workers=1, slots=seeds)
     return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
 
 

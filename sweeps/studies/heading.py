@@ -30,13 +30,14 @@ from scipy.sparse.csgraph import dijkstra
 
 from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import truth_grid
-from jaxbiped.mission.decision import nearest_direction
 from jaxbiped.mission.goal import goal_cell
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.plan_rollout import follow
-from jaxbiped.mission.route import pose_problem
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.route import nearest_direction, pose_problem
 from jaxbiped.motion.config import DurationConfig
+from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
 from jaxbiped.statistics.intervals import mean_and_median, proportion
@@ -49,30 +50,29 @@ TOGETHER = 128  # arenas
 SAME, WORTH = 0.01, 0.5  # [s]
 
 
-@partial(jax.jit, static_argnames="static")
-def ways(batch, settings, costs, static):
+@partial(jax.jit, static_argnames="spec")
+def ways(batch, params, costs, spec):
     """Times [s] of the best way [A]; and [A, C + 2] of the way of each of the `costs`, and of following the planners.
 
     On true class grids.
     """
-    spec, rules = static.spec, settings.strategy.rules()
-    classes, levels = jax.vmap(truth_grid, in_axes=(0, None, None))(batch, spec, settings.body)
+    grid, rules = spec.grid, params.strategy.rules()
+    classes, levels = jax.vmap(truth_grid, in_axes=(0, None, None))(batch, grid, params.body)
     goal_ij = jax.vmap(goal_cell, in_axes=(0, None, 0, None, None))(
-        batch.goal_xy, settings.limits.goal_radius, classes, rules, spec
+        batch.goal_xy, params.limits.goal_radius, classes, rules, grid
     )
     x, y, yaw = batch.start_xyyaw.T
-    start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(x, y, spec)
-    heading, length = jax.vmap(nearest_direction)(yaw), 3 * sum(spec.shape)
-    problem = pose_problem(classes, levels, goal_ij, start_ij, heading, yaw, settings, static)
-    field = HeadingPlanner().field(problem)
+    start_ij = jax.vmap(cell_of, in_axes=(0, 0, None))(x, y, grid)
+    heading, length = jax.vmap(nearest_direction)(yaw), 3 * sum(grid.shape)
+    begin = LocalMap(classes, levels, start_ij, Pose(x, y, jnp.zeros_like(x), yaw), grid)
+    field = HeadingPlanner().field(pose_problem(begin, goal_ij, params, spec))
     best = planning.heading_path(field, start_ij, yaw, length)
     walked = [
-        follow(classes, levels, batch.start_xyyaw, goal_ij, replace(settings, planner=planner), static)
-        for planner in (HeadingPlanner(), GridPlanner())
+        follow(begin, goal_ij, replace(params, planner=planner), spec) for planner in (HeadingPlanner(), GridPlanner())
     ]
     times = []
     for each in costs:
-        each = each.at_pitch(spec.pitch)
+        each = each.at_pitch(grid.pitch)
         edges = planning.edge_costs(classes, levels, each, rules)
         to_go = planning.field(classes, levels, each, rules, goal_ij)
         way = planning.read_path(to_go, edges, start_ij, length, heading)
@@ -83,8 +83,8 @@ def ways(batch, settings, costs, static):
 def bound(arenas: int, seed: int, strategy: str, console: Console) -> None:
     """Print how much longer the ways of Eq. 1 take than the best."""
     config = MissionConfig()
-    static = program(config, (SIZE_X, SIZE_Y))
-    settings = config.settings(strategy)
+    spec = mission_spec(config, (SIZE_X, SIZE_Y))
+    params = config.params(strategy)
     fitted = fit(DurationConfig(), measuring=True).costs
     costs = {
         "the paper's": planning.Costs(),
@@ -93,7 +93,7 @@ def bound(arenas: int, seed: int, strategy: str, console: Console) -> None:
     best, taken = [], []
     for first in range(0, arenas, TOGETHER):
         batch, _ = draw(jax.random.key(seed), first + jnp.arange(TOGETHER), FAMILIES)
-        chunk = jax.device_get(ways(batch, settings, tuple(costs.values()), static))
+        chunk = jax.device_get(ways(batch, params, tuple(costs.values()), spec))
         best.append(chunk[0])
         taken.append(chunk[1])
     best, taken = np.concatenate(best)[:arenas], np.concatenate(taken)[:arenas]

@@ -28,8 +28,8 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.mission.batched_driver import Result, stack
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import SIMULATED, MissionConfig, mission_spec
 from jaxbiped.mission.sensor_rig import RENDERED
-from jaxbiped.mission.settings import SIMULATED, MissionConfig, program
 from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.paired import success_difference
@@ -37,6 +37,7 @@ from jaxbiped.study.evaluation import draw
 from jaxbiped.study.hosted import open_rig, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all
+from jaxbiped.study.workload import Workload
 
 SCENES = sorted((Path(__file__).parents[2] / "configs" / "scenes").glob("experiment_*.toml"))
 WAYS = ("landmarks", "odometry", "visual", "icp", "both")
@@ -44,17 +45,16 @@ WAYS = ("landmarks", "odometry", "visual", "icp", "both")
 
 def play(config: MissionConfig, batch, seeds, count: int, strategy: str) -> Result:
     """Missions of one kind on a batch of arenas: leaves [count]."""
-    static = program(config, (SIZE_X, SIZE_Y))
-    points, one = stack([config.settings(strategy)]), np.zeros(1, int)
-    arguments = batch, seeds, points, count, static, lambda _: None
+    spec = mission_spec(config, (SIZE_X, SIZE_Y))
+    workload = Workload(batch, seeds, stack([config.params(strategy)]), count, spec)
     see = partial(open_rig, config.camera, config.localisation) if config.sensor in RENDERED else None
     if config.executor in SIMULATED:
         with see() if see else contextlib.nullcontext() as rig:
-            result = walk_all(*arguments, config.walk, population_of=one, rig=rig)
+            result = walk_all(workload, lambda _: None, config.walk, rig)
     elif see:
-        result = run_on_host(*arguments, see, population_of=one)
+        result = run_on_host(workload, lambda _: None, see)
     else:
-        result = run_all(*arguments)
+        result = run_all(workload, lambda _: None)
     return jax.tree.map(lambda leaf: np.asarray(leaf)[0], result)
 
 

@@ -20,7 +20,7 @@ import polars as pl
 import tyro
 from rich.console import Console
 
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.report.tables import terminal
 from jaxbiped.statistics.comparison import compare_named
 from jaxbiped.statistics.schema import FAMILIES

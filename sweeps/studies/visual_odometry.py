@@ -21,8 +21,8 @@ from rich.console import Console
 from rich.table import Table
 
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.sensing.camera import mount, placed
+from jaxbiped.mission.params import MissionConfig
+from jaxbiped.sensing.camera import MountedCamera, mount, placed
 from jaxbiped.sensing.config import VisualConfig
 from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.motion import SHARE, overlap
@@ -101,14 +101,14 @@ def trial(place: Place, pose: Pose, number: int, sensor: StereoSensor, config: M
     seconds += time.process_time() - begun
     error = np.array([motion.x, motion.y, motion.yaw], float) - true
     claimed = float(error @ np.linalg.solve(motion.cov.astype(float), error)) if motion.seen else np.nan
-    at = mount(camera, command.look[0])
+    eye = MountedCamera(camera, mount(camera, command.look[0]), config.camera.image)
     view, stands = View(*(jnp.asarray(v) for v in (view.x, view.y, view.z, view.weight))), (second, pose)
     stands = (jax.tree.map(jnp.float32, stand) for stand in stands)
-    share = float(shared(view, *stands, at, camera, image=config.camera.image, max_range=noise.max_range))
+    share = float(shared(view, *stands, eye, noise.max_range))
     return Trial(command.name, share, bool(motion.seen), error, claimed, seconds)
 
 
-shared = jax.jit(overlap, static_argnames=("image",))
+shared = jax.jit(overlap)
 
 
 def main(arenas: int = 24, views: int = 16, seed: int = 2) -> None:

@@ -11,12 +11,13 @@ import pytest
 from jaxbiped.arenas import load_scene, scene_warnings
 from jaxbiped.arenas.ground import HOLE, cast_ground, ground_height, rises_near, terrain_height
 from jaxbiped.errors import InputError
+from jaxbiped.executors.kinematic_executor import kinematic
+from jaxbiped.executors.sampled_executor import sampled
 from jaxbiped.geometry.height_field import HeightField
 from jaxbiped.geometry.rays import cast_boxes, key, nearness
 from jaxbiped.mapping import Cell, GridSpec, truth_grid
-from jaxbiped.mission.executors import kinematic
-from jaxbiped.mission.sampled_executor import sampled
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.params import MissionConfig, mission_spec
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.motion.config import RobotConfig
 from jaxbiped.motion.primitives import Command, Primitive
@@ -99,7 +100,7 @@ def test_without_terrain_an_arena_has_the_leaves_that_it_had(tmp_path):
     arena = load_scene(path)[1]
     assert arena.terrain is None
     assert len(jax.tree.leaves(arena)) == 10 + 5 + 6
-    assert program(MissionConfig(), (1.8, 1.4)) == program(MissionConfig(), (1.8, 1.4), arena.terrain)
+    assert mission_spec(MissionConfig(), (1.8, 1.4)) == mission_spec(MissionConfig(), (1.8, 1.4), arena.terrain)
 
 
 def test_rays_meet_the_nearest_of_floor_terrain_and_boxes(tmp_path):
@@ -173,7 +174,7 @@ def test_what_rises_near_is_found_at_any_side():
 def test_truth_is_that_of_the_stairs(tmp_path):
     """By hand: treads from 50, 75 and 100 cm, a hole, the end of the terrain at 160 x 120 cm, 9 cm high, a box."""
     arena = arena_of(tmp_path, stairs(holes=True))
-    spec = program(MissionConfig(), (1.8, 1.4), arena.terrain).spec
+    spec = mission_spec(MissionConfig(), (1.8, 1.4), arena.terrain).grid
     assert spec.ground_levels == 4
     classes, levels = (np.asarray(v) for v in jax.jit(truth_grid, static_argnums=1)(arena, spec, RobotConfig().body()))
     row = classes[14]  # y from 70 to 75 cm
@@ -230,15 +231,16 @@ def test_the_referee_knows_terrain(tmp_path, case):
     (x, y), length, rise, end = CASES[case]
     arena = arena_of(tmp_path, stairs(holes=True))
     arena = replace(arena, start_xyyaw=jnp.array([x, y, 0.0], jnp.float32))
-    settings = MissionConfig().settings("full")
-    world, _ = start(arena, settings, jnp.uint32(0), program(MissionConfig(), (1.8, 1.4), arena.terrain).spec)
+    params = MissionConfig().params("full")
+    setup = MissionSetup(arena, params, mission_spec(MissionConfig(), (1.8, 1.4), arena.terrain))
+    world, _ = start(setup, jnp.uint32(0))
     assert float(world.pose.z) == pytest.approx(float(ground_at(arena, (x, y))[0]), abs=1e-6)
     kind = {0: Primitive.STRAIGHT_FORWARD, 1: Primitive.STEP_UP_BUMP, -1: Primitive.STEP_DOWN_BUMP}[rise]
     command = Command(
         turn=jnp.float32(0), primitive=jnp.int32(kind), length=jnp.float32(length), rise=jnp.int32(rise),
         squat=jnp.zeros((), bool), left=jnp.float32(0),
     )  # fmt: skip
-    done = kinematic(arena, world, command, settings)
+    done = kinematic(arena, world, command, params)
     assert [name for name in ("fell", "collided", "outside") if getattr(done, name)] == ([end] if end else [])
     if end is None:
         assert float(done.pose.z) == pytest.approx(float(ground_at(arena, (x + length, y))[0]), abs=1e-6)
@@ -247,19 +249,19 @@ def test_the_referee_knows_terrain(tmp_path, case):
 def test_the_sampled_executor_knows_terrain(tmp_path):
     """On a tread it stands, at the tread's height; into the hole it falls; at the end of the terrain its feet kick."""
     arena = arena_of(tmp_path, stairs(holes=True))
-    settings, still = MissionConfig(executor="sampled").settings("full"), jnp.zeros((), bool)
-    spec = program(MissionConfig(), (1.8, 1.4), arena.terrain).spec
+    params, still = MissionConfig(executor="sampled").params("full"), jnp.zeros((), bool)
+    spec = mission_spec(MissionConfig(), (1.8, 1.4), arena.terrain)
 
     @jax.jit
     def play(pose, length):
         there = replace(arena, start_xyyaw=pose)
-        world, _ = start(there, settings, jnp.uint32(1), spec)
+        world, _ = start(MissionSetup(there, params, spec), jnp.uint32(1))
         whole = jnp.int32(0)
         command = Command(
             turn=jnp.float32(0), primitive=whole + Primitive.STRAIGHT_FORWARD, length=length, rise=whole, squat=still,
             left=jnp.float32(0),
         )  # fmt: skip
-        return sampled(there, world, command, settings)
+        return sampled(there, world, command, params)
 
     for pose, length, end in (
         ((0.6, 0.7, 0.0), 0.05, None),

@@ -67,10 +67,10 @@ def a_study(module, points):
         (here / "sweep.toml").write_text(SWEEP)
         (here / "configs").symlink_to(Path(__file__).parents[2] / "configs")
 
-        def conduct(folder, *_, **__):
+        def compute_study(folder, *_, **__):
             return read_manifest(stored(folder, arenas=12, points=points))
 
-        monkeypatch.setattr(module, "conduct", conduct)
+        monkeypatch.setattr(module, "compute_study", compute_study)
 
     return prepare
 

@@ -9,7 +9,7 @@ import pytest
 from jaxbiped import cli, files
 from jaxbiped.commands import compare, run
 from jaxbiped.core.names import METRICS
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import PRESETS
 from jaxbiped.statistics.schema import SCHEMA

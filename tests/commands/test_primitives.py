@@ -11,7 +11,7 @@ from jaxbiped.biped.spread import SETS
 from jaxbiped.commands import primitives
 from jaxbiped.config import load
 from jaxbiped.errors import InputError
-from jaxbiped.mission.library import DEFAULT, PLAYED, LibraryConfig, load_library
+from jaxbiped.executors.motion_library import DEFAULT, PLAYED, LibraryConfig, load_library
 from jaxbiped.report import video
 from tests.commands.test_cli import SCENE, here, refused
 

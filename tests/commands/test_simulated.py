@@ -8,7 +8,7 @@ import pytest
 
 from jaxbiped import cli
 from jaxbiped.commands import run
-from jaxbiped.mission.settings import SWAYING, MissionConfig
+from jaxbiped.mission.params import SWAYING, MissionConfig
 from jaxbiped.motion.config import RobotConfig
 
 SCENE = """

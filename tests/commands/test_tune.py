@@ -12,7 +12,7 @@ import pytest
 
 from jaxbiped import cli, files
 from jaxbiped.config import load
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.statistics.schema import FAMILIES
 from jaxbiped.study import trials
 from jaxbiped.study.config import StudyConfig

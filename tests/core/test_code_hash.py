@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import jax
 import pytest
 
+import jaxbiped as jb
 from jaxbiped.core.code_hash import component_hash
 from jaxbiped.planning.host_planner import HostPlanner
 from jaxbiped.planning.planners import GridPlanner
@@ -98,3 +99,7 @@ def nothing(*problem):
 @pytest.mark.parametrize("other", [HostPlanner(nothing, limit=3.0), HostPlanner(lambda *problem: None)])
 def test_host_planners_differ_by_function_and_limit(other):
     assert component_hash(other) != component_hash(HostPlanner(nothing))
+
+
+def test_classes_that_have_moved_keep_the_hash_that_studies_stored():
+    assert (component_hash(jb.Kinematic()), component_hash(jb.Sampled())) == ("de499a35bb1f", "4e31bbefee35")

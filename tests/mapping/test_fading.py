@@ -13,7 +13,7 @@ from jaxbiped.mapping import Cell, GridSpec, MapConfig, classify, empty, update
 from jaxbiped.mapping.fading import HIDDEN, Eye, missed
 from jaxbiped.mapping.gridmap import voxel_of, voxelise
 from jaxbiped.sensing import raycast
-from jaxbiped.sensing.camera import T_robot_camera, mount
+from jaxbiped.sensing.camera import MountedCamera, T_robot_camera, mount
 from jaxbiped.sensing.presets import sensor_preset
 from tests.mapping.scenes import BODY
 from tests.sensing.scenes import CAMERA, IMAGE, as_jax, make
@@ -28,7 +28,7 @@ GATE = [(0.8, 0.40, 0, 0.025, 0.08, 0, 0.5), (0.8, 1.0, 0, 0.025, 0.08, 0, 0.5),
 @jax.jit
 def look(grid_map, arena, pose, seed, keep):
     view = raycast.measure(arena, pose, CAMERA, NOISE, IMAGE, seed)
-    eye = Eye(CAMERA, mount(CAMERA), IMAGE, keep)
+    eye = Eye(MountedCamera(CAMERA, mount(CAMERA), IMAGE), keep)
     return update(grid_map, view, pose, BODY, PARAMS, SPEC, eye=eye)
 
 
@@ -88,7 +88,7 @@ def test_what_is_missed_as_by_plain_loops(seed):
     view = raycast.measure(arena, pose, CAMERA, NOISE, IMAGE, jnp.uint32(seed))
     at_ = mount(CAMERA)
     points = voxelise(view, *voxel_of(view, pose, PARAMS, SPEC), SPEC)
-    found = np.asarray(missed(view, points, pose, CAMERA, at_, IMAGE, SPEC))
+    found = np.asarray(missed(view, points, pose, MountedCamera(CAMERA, at_, IMAGE), SPEC))
     T = np.linalg.inv(np.asarray(T_robot_camera(at_), float))
 
     def pixel(x, y, z):

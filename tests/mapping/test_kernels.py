@@ -19,7 +19,7 @@ from jaxbiped.mapping import cobstacles, gridmap
 from jaxbiped.mapping.config import MapConfig
 from jaxbiped.mapping.grid import Body, Cell, GridSpec
 from jaxbiped.mapping.gridmap import GridMap
-from jaxbiped.mapping.relief import Surfaces
+from jaxbiped.mapping.relief import PlacedView, Surfaces
 from jaxbiped.sensing.view import View
 
 SPECS = {
@@ -111,7 +111,8 @@ def draw(seed, spec):
 
 def one_view(way, spec, grid_map, view, pose, body, params):
     index, counts = gridmap.voxel_of(view, pose, params, spec)
-    return way(grid_map, view, pose.z, index, counts, cobstacles.careful(body, params), params, spec)
+    placed = PlacedView(view, pose.z, index, counts)
+    return way(grid_map, placed, cobstacles.careful(body, params), params, spec)
 
 
 def class_cells(way, spec, grid_map, view, pose, body, params):

@@ -1,4 +1,4 @@
-"""Missions for tests. One program, one number of slots, arenas, settings and jobs: compiled once a session."""
+"""Missions for tests. One program, one number of slots, arenas, points and jobs: compiled once a session."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ import pytest
 
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.core.names import STRATEGIES
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.mission.batched_driver import Jobs, compile_queue, stack
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import turn_once
-from jaxbiped.mission.settings import MissionConfig, program
-from jaxbiped.mission.state import WorldState, start
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
 from jaxbiped.study.evaluation import draw
 from tests.mission.replay import Moment
 
-ARENAS, SETTINGS, JOBS, SLOTS = 32, 16, 32, 8
+ARENAS, POINTS, JOBS, SLOTS = 32, 16, 32, 8
 CONFIG = MissionConfig()
-PROGRAM = program(CONFIG, (SIZE_X, SIZE_Y))
+SPEC = mission_spec(CONFIG, (SIZE_X, SIZE_Y))
 REAL = MissionConfig(stereo=PRESETS["real"].stereo, landmarks=PRESETS["real"].landmarks)
 
 
@@ -37,11 +39,11 @@ def row(tree, index):
     return jax.tree.map(lambda leaf: np.asarray(leaf)[index], tree)
 
 
-def play(arenas, settings, seeds, program=PROGRAM, slots=SLOTS):
-    """Mission k in arena k under settings k by the compiled queue; lists of at most JOBS, results [k]."""
+def play(arenas, params, seeds, spec=SPEC, slots=SLOTS):
+    """Mission k in arena k under parameters k by the compiled queue; lists of at most JOBS, results [k]."""
     count = len(arenas)
-    points = list({id(setting): setting for setting in settings}.values())
-    point = [next(p for p, q in enumerate(points) if q is setting) for setting in settings]
+    points = list({id(setting): setting for setting in params}.values())
+    point = [next(p for p, q in enumerate(points) if q is setting) for setting in params]
     fill = [0] * (JOBS - count)
     jobs = Jobs(
         np.array([*range(count), *fill], np.int32),
@@ -49,8 +51,9 @@ def play(arenas, settings, seeds, program=PROGRAM, slots=SLOTS):
         np.array([*seeds, *fill], np.uint32),
         jnp.int32(count),
     )
-    arguments = jax.tree.map(jnp.asarray, (pad(arenas, ARENAS), pad(points, SETTINGS), jobs))
-    work = compile_queue(*arguments, program, slots)
+    setup = MissionSetup(pad(arenas, ARENAS), pad(points, POINTS), spec)
+    arguments = jax.tree.map(jnp.asarray, (setup, jobs))
+    work = compile_queue(*arguments, slots)
     return row(jax.device_get(work(*arguments, lambda ended: None)), slice(count))
 
 
@@ -66,34 +69,34 @@ class Log:
     world: WorldState  # at the end
 
 
-def step_through(arena, setting, seed, program=PROGRAM) -> Log:
+def step_through(arena, setting, seed, spec=SPEC) -> Log:
     """One mission by a Python loop over `step`, alone in its batch, as the package's recorded driver has it."""
-    batch = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (arena, setting))
-    world, mind = compiled_start(*batch, jnp.asarray([seed]), program.spec)
+    setup = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], MissionSetup(arena, setting, spec))
+    world, agent = compiled_start(setup, jnp.asarray([seed]))
     taken, moments = [], []
     while world.code[0] == Code.RUNNING:
-        before = world, mind.look
-        world, mind, view, command, thought = turn_once(world, mind, *batch, program)
-        taken.append(row((thought.classes, thought.levels, mind.grid_map.votes, command), 0))
-        after = view, thought.pose, mind.grid_map, thought.classes, thought.levels, thought.problem.start_ij
+        before = world, agent.look
+        world, agent, view, command, thought = turn_once(world, agent, setup)
+        taken.append(row((thought.classes, thought.levels, agent.grid_map.votes, command), 0))
+        after = view, thought.pose, agent.grid_map, thought.classes, thought.levels, thought.problem.start_ij
         moments.append(Moment(*row((*before, *after), 0)))
     return Log(*stack(taken), tuple(moments), row(world, 0))
 
 
-compiled_start = jax.jit(jax.vmap(start, in_axes=(0, 0, 0, None)), static_argnums=3)
+compiled_start = jax.jit(jax.vmap(start))
 
 
 @pytest.fixture(scope="session")
 def population():
     """24 random arenas of all families under all strategies, half of them with the noise of real cameras.
 
-    (arenas, settings, seeds, names of the strategies), lists of equal length.
+    (arenas, parameters, seeds, names of the strategies), lists of equal length.
     """
     arenas, seeds = jax.device_get(draw(jax.random.key(5), jnp.arange(24), FAMILIES))
-    named = [{name: jax.device_get(c.settings(name)) for name in STRATEGIES} for c in (CONFIG, REAL)]
+    named = [{name: jax.device_get(c.params(name)) for name in STRATEGIES} for c in (CONFIG, REAL)]
     names = [list(STRATEGIES)[(k + k // 6) % 5] for k in range(24)]
-    settings = [named[k // 2 % 2][name] for k, name in enumerate(names)]
-    return [row(arenas, k) for k in range(24)], settings, list(seeds), names
+    params = [named[k // 2 % 2][name] for k, name in enumerate(names)]
+    return [row(arenas, k) for k in range(24)], params, list(seeds), names
 
 
 @pytest.fixture(scope="session")

@@ -13,12 +13,12 @@ from itertools import product
 
 import numpy as np
 
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping.grid import Cell, GridSpec
 from jaxbiped.mapping.gridmap import GridMap
 from jaxbiped.mapping.relief import FACE, Surfaces
 from jaxbiped.mission.mission_step import SENSE
-from jaxbiped.mission.state import WorldState
 from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.view import View
 from tests.reference import mapping, sensing
@@ -62,23 +62,24 @@ class Close:
     cells: int  # in which a height decided otherwise
 
 
-def replay(moment: Moment, before: GridMap | None, arena, settings, program) -> Close:
+def replay(moment: Moment, before: GridMap | None, arena, params, spec) -> Close:
     """Do one decision again; AssertionError where it differs by more than what rounding decides.
 
     Args:
       before: the compiled loop's map before this view; None where this is the first.
     """
-    spec, params = program.spec, settings.mapping
+    grid, map_params = spec.grid, params.mapping
     if before is None:
-        before, pose = mapping.empty(spec), moment.pose
-        before = mapping.mark_footprint(before, pose.x, pose.y, pose.z, settings.limits.body_radius, spec)
-    rays = check_view(moment, arena, settings, program)
+        before, pose = mapping.empty(grid), moment.pose
+        before = mapping.mark_footprint(before, pose.x, pose.y, pose.z, params.limits.body_radius, grid)
+    rays = check_view(moment, arena, params, spec)
     added = moment.grid_map.evidence - before.evidence
     surfaces = moment.grid_map.surfaces, before.surfaces
-    found = next((f for f in fits(moment, params, spec) if f.explains(added) and f.explains_heights(*surfaces)), None)
+    fitted = fits(moment, map_params, grid)
+    found = next((f for f in fitted if f.explains(added) and f.explains_heights(*surfaces)), None)
     assert found is not None, "counts or heights that no choice of sides explains"
-    cells = check_votes(moment, before, added, settings.body, params, spec)
-    check_classes(moment, params, spec)
+    cells = check_votes(moment, before, added, params.body, map_params, grid)
+    check_classes(moment, map_params, grid)
     return Close(found.count, len(found.options), rays, int(not found.first), cells)
 
 
@@ -88,17 +89,15 @@ def apart(one: View, other: View, most: float) -> np.ndarray:
     return (one.weight != other.weight) | ((np.abs(both[0] - both[1]) > most).any(0) & (one.weight > 0))
 
 
-def check_view(moment: Moment, arena, settings, program) -> int:
+def check_view(moment: Moment, arena, params, spec) -> int:
     """Number of rays that differ; each must be one that the plain sensor decides so when it is moved a little."""
     world = moment.world
     seed = fold(world.seed, SENSE, world.decisions)
 
     def measure(bias=0.0, **moved):
         pose = replace(world.pose, **{name: getattr(world.pose, name) + by for name, by in moved.items()})
-        noise = replace(settings.stereo, bias=settings.stereo.bias + bias)
-        return sensing.measure_raycast(
-            arena, pose, settings.camera, noise, program.image, seed, moment.look, world.squat
-        )
+        noise = replace(params.stereo, bias=params.stereo.bias + bias)
+        return sensing.measure_raycast(arena, pose, params.camera, noise, spec.image, seed, moment.look, world.squat)
 
     plain = measure()
     other = apart(moment.view, plain, POINT)
@@ -111,25 +110,25 @@ def check_view(moment: Moment, arena, settings, program) -> int:
     return int(other.sum())
 
 
-def fits(moment: Moment, params, spec: GridSpec):
+def fits(moment: Moment, map_params, grid: GridSpec):
     """The points of a view brought level by the plain fit; then by that fit with its thresholds moved a little."""
     view, support = moment.view, moment.pose.z
-    yield Placed(mapping.level_view(view, support, params, spec), moment.pose, params, spec, first=True)
+    yield Placed(mapping.level_view(view, support, map_params, grid), moment.pose, map_params, grid, first=True)
     for name, by in product(("border", "reaches", "plain"), (HEIGHT, -HEIGHT)):
-        level = mapping.level_view(view, support, params, spec, **{name: by})
-        yield Placed(level, moment.pose, params, spec, first=False)
+        level = mapping.level_view(view, support, map_params, grid, **{name: by})
+        yield Placed(level, moment.pose, map_params, grid, first=False)
 
 
 class Placed:
     """The points of one view on the grid: those that lie well within a voxel, and those that may fall into several."""
 
-    def __init__(self, view, pose, params, spec, first):
-        self.params, self.spec, self.first = params, spec, first
-        at, self.height, self.weight, self.near = mapping.coordinates(view, pose, params, spec)
-        shape = (*spec.shape, spec.levels)
+    def __init__(self, view, pose, map_params, grid, first):
+        self.map_params, self.grid, self.first = map_params, grid, first
+        at, self.height, self.weight, self.near = mapping.coordinates(view, pose, map_params, grid)
+        shape = (*grid.shape, grid.levels)
         sides = []
         for signs in product((-1, 1), repeat=3):
-            index, inside = mapping.voxels_at(at + BORDER * np.array(signs)[:, None], spec)
+            index, inside = mapping.voxels_at(at + BORDER * np.array(signs)[:, None], grid)
             index[:, ~inside] = 0
             sides.append(np.where(inside, np.ravel_multi_index(index.astype(int), shape), -1))
         sides = np.array(sides)
@@ -140,9 +139,9 @@ class Placed:
     def counts(self):
         """Points in each voxel, as they count."""
         inside = self.index >= 0
-        shape = (*self.spec.shape, self.spec.levels)
+        shape = (*self.grid.shape, self.grid.levels)
         sums = np.bincount(self.index[inside], self.weight[inside], np.prod(shape)).astype(np.float32)
-        sums[sums < self.params.voxel_points * np.float32(self.spec.cell_share)] = 0
+        sums[sums < self.map_params.voxel_points * np.float32(self.grid.cell_share)] = 0
         return sums.reshape(shape)
 
     def explains(self, added) -> bool:
@@ -157,30 +156,30 @@ class Placed:
     def explains_heights(self, after, before) -> bool:
         """Whether the sums of heights are these, but for points that are as high as where a face begins."""
         inside = self.index >= 0
-        shape = (*self.spec.shape, self.spec.levels)
+        shape = (*self.grid.shape, self.grid.levels)
         voxels = np.array(np.unravel_index(self.index[inside], shape))
         height, weight = self.height[inside], (self.weight * self.near)[inside]
-        ways = [mapping.add_surfaces(before, voxels, height, weight, self.spec, FACE + by) for by in (-HEIGHT, HEIGHT)]
+        ways = [mapping.add_surfaces(before, voxels, height, weight, self.grid, FACE + by) for by in (-HEIGHT, HEIGHT)]
         most = ways[0].weight  # the lower a face begins, the more points are of the top
-        for name, error in (("weight", SUM * most), ("rise", (SUM * self.spec.level_height + HEIGHT) * most)):
+        for name, error in (("weight", SUM * most), ("rise", (SUM * self.grid.level_height + HEIGHT) * most)):
             ours, both = getattr(after, name), np.array([getattr(way, name) for way in ways])
             if ((ours < both.min(0) - error) | (ours > both.max(0) + error)).any():
                 return False
         return True
 
 
-def check_votes(moment: Moment, before: GridMap, added, body, params, spec: GridSpec) -> int:
+def check_votes(moment: Moment, before: GridMap, added, body, map_params, grid: GridSpec) -> int:
     """Number of cells that were classed otherwise, each by a height at a tolerance; all other votes are the same."""
     after = moment.grid_map
     count = added.sum(-1)
-    count[count < params.view_points * np.float32(spec.cell_share)] = 0
+    count[count < map_params.view_points * np.float32(grid.cell_share)] = 0
 
     def other(by=0.0, between=0.0):
         """Where the votes differ, with the body's tolerances moved, and levels moved apart."""
         tolerances = {name: getattr(body, name) + np.float32(by) for name in ("step_tolerance", "height_tolerance")}
-        shift = between * np.where(np.arange(spec.ground_levels) % 2, 1, -1)[:, None, None]
+        shift = between * np.where(np.arange(grid.ground_levels) % 2, 1, -1)[:, None, None]
         surfaces = Surfaces(after.surfaces.weight, (after.surfaces.rise + shift * after.surfaces.weight))
-        kinds = mapping.c_obstacles(after.evidence, surfaces, replace(body, **tolerances), params, spec)
+        kinds = mapping.c_obstacles(after.evidence, surfaces, replace(body, **tolerances), map_params, grid)
         plain = mapping.add_votes(before, count, *kinds)
         return (plain.votes != after.votes).any(-1) | (plain.level_votes != after.level_votes).any(-1)
 
@@ -193,10 +192,10 @@ def check_votes(moment: Moment, before: GridMap, added, body, params, spec: Grid
     return int(first.sum())
 
 
-def check_classes(moment: Moment, params, spec: GridSpec) -> None:
+def check_classes(moment: Moment, map_params, grid: GridSpec) -> None:
     """The map is what the votes make of it; the robot's own cell can be stood on."""
-    classes, levels = mapping.classify(moment.grid_map, params, spec)
-    ij, level = tuple(moment.ij), int(np.round(moment.pose.z / np.float32(spec.level_height)))
+    classes, levels = mapping.classify(moment.grid_map, map_params, grid)
+    ij, level = tuple(moment.ij), int(np.round(moment.pose.z / np.float32(grid.level_height)))
     if classes[ij] != Cell.GATE:
         classes[ij] = Cell.BUMP if level else Cell.FLOOR
     levels[ij] = level

@@ -12,10 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxbiped.core.registry import EXECUTORS
+from jaxbiped.executors.execution import Executor
+from jaxbiped.executors.kinematic_executor import kinematic
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose, to_world
-from jaxbiped.mission.execution import Executor
-from jaxbiped.mission.executors import kinematic
 from jaxbiped.motion.primitives import Primitive
 
 FINE = np.arange(-0.06, 0.2401, 0.001, dtype=np.float32)  # [m] ahead of the robot, where edges are looked for
@@ -63,16 +63,16 @@ def stands(arena, pose, slack):
     return ~tripped, ~jnp.any(ankle & (ground < -0.01))
 
 
-def strict(arena, world, command, settings):
+def strict(arena, world, command, params):
     """As `kinematic`, but a step falls when the edge lies off its place, or off square."""
-    done = kinematic(arena, world, replace(command, rise=0 * command.rise), settings)
+    done = kinematic(arena, world, replace(command, rise=0 * command.rise), params)
     done = replace(done, fell=jnp.zeros((), bool))
     yaw = world.pose.yaw + command.turn
     turned = Pose(world.pose.x, world.pose.y, world.pose.z, yaw)
-    fall = footfall(arena, turned, command.rise, settings.footing)
+    fall = footfall(arena, turned, command.rise, params.footing)
     stepped = (command.primitive == Primitive.STEP_UP_BUMP) | (command.primitive == Primitive.STEP_DOWN_BUMP)
     good = fall.found & (jnp.abs(fall.off) < TOLERANCE) & (jnp.abs(fall.askew) < ASKEW)
-    pose = replace(done.pose, z=world.pose.z + command.rise * settings.limits.rise)
+    pose = replace(done.pose, z=world.pose.z + command.rise * params.limits.rise)
     clean, held = stands(arena, pose, 0.008)
     walks = (jnp.abs(command.length) + jnp.abs(command.turn) + jnp.abs(command.left)) > 0
     bad = jnp.where(stepped, ~good, walks & ~(clean & held))
@@ -86,8 +86,8 @@ class Strict(Executor):
 
     places_feet = True
 
-    def execute(self, arena, world, command, settings):
-        return strict(arena, world, command, settings)
+    def execute(self, arena, world, command, params):
+        return strict(arena, world, command, params)
 
 
 EXECUTORS.add("strict", Strict())

@@ -10,12 +10,12 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.core.component import check_component
 from jaxbiped.core.registry import EXECUTORS, METRICS, SENSORS
+from jaxbiped.executors.execution import Execution, execution_of, find_executor
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.execution import Execution, execution_of, find_executor
 from jaxbiped.mission.host_sensor import HostSensor
 from jaxbiped.mission.metric import MissionEnd, Step, as_metric, column_of, find_metric, numbers_at_end, updated
+from jaxbiped.mission.params import mission_spec
 from jaxbiped.mission.sensors import Standpoint, find_sensor, view_of
-from jaxbiped.mission.settings import program
 from jaxbiped.sensing.view import View
 
 ZERO, NO = jnp.zeros(()), jnp.zeros((), bool)
@@ -198,9 +198,9 @@ def test_walls_are_not_matched_by_a_sensor_without_pictures():
         for way in ("icp", "both"):
             config = jb.MissionConfig(sensor="lone_points", localisation=way)
             with pytest.raises(jb.InputError, match="localisation: needs a picture, and lone_points measures none"):
-                program(config, (1.8, 1.4))
+                mission_spec(config, (1.8, 1.4))
         for sensor, way in (("lone_points", "odometry"), ("raycast", "icp"), ("oracle", "icp"), ("stereo", "both")):
-            program(jb.MissionConfig(sensor=sensor, localisation=way), (1.8, 1.4))
+            mission_spec(jb.MissionConfig(sensor=sensor, localisation=way), (1.8, 1.4))
     finally:
         SENSORS.held.pop("lone_points")
 

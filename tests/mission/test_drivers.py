@@ -8,8 +8,10 @@ import pytest
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import run_logged
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.study.queues import run_all
-from tests.mission.conftest import PROGRAM, pad, play, row
+from jaxbiped.study.workload import Workload
+from tests.mission.conftest import SPEC, pad, play, row
 
 # A program for another number of slots may sum in another order: a hundred roundings of a float32.
 OTHER_PROGRAM = 1e-5
@@ -30,7 +32,7 @@ def test_stepped_driver_gives_the_missions_of_the_queue(played, stepped):
 @pytest.mark.parametrize("k", [0, 3])
 def test_logged_mission_is_that_of_the_queue(population, played, k):
     arena, setting, seed = (jax.tree.map(jnp.asarray, part[k]) for part in population[:3])
-    mission = run_logged(arena, setting, seed, PROGRAM)
+    mission = run_logged(MissionSetup(arena, setting, SPEC), seed)
     assert mission.code == played.code[k]
     assert mission.distance == pytest.approx(played.distance[k], OTHER_PROGRAM)
     assert mission.time == mission.played[-1].time == pytest.approx(played.time[k], OTHER_PROGRAM)
@@ -39,21 +41,20 @@ def test_logged_mission_is_that_of_the_queue(population, played, k):
 
 
 def test_place_in_the_queue_and_neighbours_do_not_matter(population, played):
-    arenas, settings, seeds, _ = population
+    arenas, params, seeds, _ = population
     order = np.random.default_rng(0).permutation(len(arenas))[:11]
-    some = play([arenas[k] for k in order], [settings[k] for k in order], [seeds[k] for k in order])
+    some = play([arenas[k] for k in order], [params[k] for k in order], [seeds[k] for k in order])
     assert_same(some, row(played, order))
 
 
 def test_slots_workers_and_batch_do_not_matter(population, played):
-    arenas, settings, seeds, _ = population
-    points = list({id(setting): setting for setting in settings}.values())
+    arenas, params, seeds, _ = population
+    points = list({id(setting): setting for setting in params}.values())
     ended = []
     batch = jax.tree.map(jnp.asarray, pad(arenas, len(arenas)))
-    everything = run_all(
-        batch, jnp.asarray(seeds), stack(points), len(arenas), PROGRAM, ended.append, workers=3, slots=5
-    )
-    for k, setting in enumerate(settings):
+    workload = Workload(batch, jnp.asarray(seeds), stack(points), len(arenas), SPEC)
+    everything = run_all(workload, ended.append, workers=3, slots=5)
+    for k, setting in enumerate(params):
         point = next(p for p, q in enumerate(points) if q is setting)
         assert_same(row(everything, (point, k)), row(played, k), OTHER_PROGRAM)
     assert not np.any(everything.code == Code.RUNNING)

@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.scene import SceneConfig, to_arena
+from jaxbiped.executors.kinematic_executor import kinematic
+from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.geometry.boxes import ground_height
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.executors import kinematic
 from jaxbiped.mission.mission_step import apply_outcome
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.state import Planned, WorldState, start
+from jaxbiped.mission.setup import MissionSetup
+from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing.counter_rng import fold
-from tests.mission.conftest import CONFIG, PROGRAM, play, row
+from tests.mission.conftest import CONFIG, SPEC, play, row
 from tests.reference import motion as plain
 
 WALL = {"centre": (0.9, 0.7), "size": (0.1, 1.4), "top": 0.5}
@@ -53,7 +55,7 @@ CASES = {  # name: (arena, strategy, code)
 
 @pytest.fixture(scope="module")
 def outcomes():
-    named = {name: jax.device_get(CONFIG.settings(name)) for name in ("full", "blind_stop")}
+    named = {name: jax.device_get(CONFIG.params(name)) for name in ("full", "blind_stop")}
     named["short"] = limited(named["full"], max_decisions=np.int32(3))
     arenas = [arena for arena, _, _ in CASES.values()]
     return play(arenas, [named[name] for _, name, _ in CASES.values()], [7] * len(arenas))
@@ -74,17 +76,18 @@ def test_code(outcomes, name):
 
 
 def test_out_of_bounds():
-    arena, setting = to_device(scene()), to_device(CONFIG.settings("full"))
-    world, mind = start(arena, setting, jnp.uint32(1), PROGRAM.spec)
+    arena, setting = to_device(scene()), to_device(CONFIG.params("full"))
+    setup = MissionSetup(arena, setting, SPEC)
+    world, agent = start(setup, jnp.uint32(1))
     world = replace(world, pose=replace(world.pose, x=jnp.float32(1.77)))
     step = Command(
         jnp.float32(0), jnp.int32(Primitive.STRAIGHT_FORWARD), jnp.float32(0.05), jnp.int32(0), jnp.array(False)
     )
     done = kinematic(arena, world, step, setting)
     assert bool(done.outside)
-    after, _ = apply_outcome(world, mind, step, jnp.int32(Code.RUNNING), done, arena, setting, PROGRAM)
+    after, _ = apply_outcome(world, agent, step, jnp.int32(Code.RUNNING), done, setup)
     assert after.code == Code.OUT_OF_BOUNDS
-    stopped, _ = apply_outcome(world, mind, step, jnp.int32(Code.NO_PATH), done, arena, setting, PROGRAM)
+    stopped, _ = apply_outcome(world, agent, step, jnp.int32(Code.NO_PATH), done, setup)
     assert stopped.code == Code.NO_PATH and stopped.pose.x == world.pose.x and stopped.distance == 0
 
 
@@ -98,7 +101,7 @@ PLACES = 400  # random poses and commands, near enough to things that most of th
 def test_referee_is_that_of_the_reference(population):
     rng = np.random.default_rng(3)
     arenas = [population[0][k] for k in range(24)]
-    setting = jax.device_get(CONFIG.settings("full"))
+    setting = jax.device_get(CONFIG.params("full"))
     which = rng.integers(0, 24, PLACES)
     x, y, yaw = rng.uniform(0.02, 1.78, PLACES), rng.uniform(0.02, 1.38, PLACES), rng.uniform(-3.1, 3.1, PLACES)
     rise, squat = rng.integers(-1, 2, PLACES), rng.random(PLACES) < 0.3
@@ -152,8 +155,8 @@ def test_referee_is_that_of_the_reference(population):
 @pytest.mark.parametrize(("squat", "clearance", "hit"), [(False, 0.37, True), (True, 0.37, False), (True, 0.335, True)])
 def test_lintel_hits_who_stands(squat, clearance, hit):
     arena = to_device(scene({"centre": (0.9, 0.7), "size": (0.05, 0.6), "bottom": clearance, "top": 0.5}))
-    setting = to_device(CONFIG.settings("full"))
-    world, _ = start(arena, setting, jnp.uint32(1), PROGRAM.spec)
+    setting = to_device(CONFIG.params("full"))
+    world, _ = start(MissionSetup(arena, setting, SPEC), jnp.uint32(1))
     world = replace(world, pose=replace(world.pose, x=jnp.float32(0.8)))
     step = Command(jnp.float32(0), jnp.int32(Primitive.PASS_GATE), jnp.float32(0.05), jnp.int32(0), jnp.array(squat))
     assert bool(kinematic(arena, world, step, setting).collided) == hit
@@ -167,8 +170,8 @@ STEPS_UP = [(1, 0.05, False), (1, 0.01, False), (1, -0.01, False), (1, -0.03, Tr
 def test_edge_may_lie_off_by_the_tolerance_but_no_more(rise, ahead, fell):
     """A bump of 3 cm from x = 0.70 on; the robot steps from before it to `ahead` beyond its edge."""
     arena = to_device(scene({"centre": (0.9, 0.7), "size": (0.4, 1.4), "top": 0.03}))
-    setting = to_device(CONFIG.settings("full"))
-    world, _ = start(arena, setting, jnp.uint32(1), PROGRAM.spec)
+    setting = to_device(CONFIG.params("full"))
+    world, _ = start(MissionSetup(arena, setting, SPEC), jnp.uint32(1))
     world = replace(world, pose=replace(world.pose, x=jnp.float32(0.66)))
     step = Command(
         jnp.float32(0), jnp.int32(2 if rise > 0 else 1), jnp.float32(0.04 + ahead), jnp.int32(rise), jnp.array(False)
@@ -178,8 +181,8 @@ def test_edge_may_lie_off_by_the_tolerance_but_no_more(rise, ahead, fell):
 
 
 def test_noise_of_odometry_is_that_of_mission_and_decision():
-    arena, setting = to_device(scene()), to_device(CONFIG.settings("full"))
-    world, _ = start(arena, setting, jnp.uint32(1), PROGRAM.spec)
+    arena, setting = to_device(scene()), to_device(CONFIG.params("full"))
+    world, _ = start(MissionSetup(arena, setting, SPEC), jnp.uint32(1))
     step = Command(jnp.float32(0.1), jnp.int32(1), jnp.float32(0.05), jnp.int32(0), jnp.array(False))
     moved = [
         np.asarray(kinematic(arena, replace(world, decisions=jnp.int32(n), seed=seed), step, setting).moved)

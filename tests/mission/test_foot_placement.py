@@ -14,17 +14,18 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.config import EXECUTORS
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import turn_once
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.study.evaluation import draw
-from tests.mission.conftest import CONFIG, PROGRAM, row
+from tests.mission.conftest import CONFIG, SPEC, row
 from tests.mission.strict import Strict, footfall
 
 SCENES = [Path(__file__).parents[2] / "configs" / "scenes" / f"experiment_{k}.toml" for k in (3, 5)]
 FAMILIES = ("bump", "stairs", "mixed")
 ARENAS = 30
-STRICT = replace(PROGRAM, footing=True, executor="strict")
+STRICT = replace(SPEC, footing=True, executor="strict")
 TURNS = 80
 
 
@@ -34,17 +35,17 @@ def walked():
     arenas, seeds = jax.device_get(draw(jax.random.key(11), jnp.arange(ARENAS), FAMILIES))
     rows = [row(arenas, k) for k in range(ARENAS)] + [jax.device_get(load_scene(path)[1]) for path in SCENES]
     batch = jax.tree.map(jnp.asarray, stack(rows))
-    setting = replace(CONFIG.settings("full"), executor=Strict())
-    settings = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (len(rows), *leaf.shape)), setting)
+    setting = replace(CONFIG.params("full"), executor=Strict())
+    params = jax.tree.map(lambda leaf: jnp.broadcast_to(leaf, (len(rows), *leaf.shape)), setting)
     seeds = jnp.asarray([*seeds, 7, 8], jnp.uint32)
-    world, mind = jax.jit(jax.vmap(start, in_axes=(0, 0, 0, None)), static_argnums=3)(
-        batch, settings, seeds, PROGRAM.spec
-    )
+    setup = MissionSetup(batch, params, SPEC)
+    world, agent = jax.jit(jax.vmap(start))(setup, seeds)
+    setup = replace(setup, spec=STRICT)
     look = jax.jit(jax.vmap(footfall, in_axes=(0, 0, 0, None)))
     steps = []
     for _ in range(TURNS):
         before = world
-        world, mind, _, command, _ = turn_once(world, mind, batch, settings, STRICT)
+        world, agent, _, command, _ = turn_once(world, agent, setup)
         pose = before.pose
         fall = look(batch, Pose(pose.x, pose.y, pose.z, pose.yaw + command.turn), command.rise, setting.footing)
         running, command, fall = jax.device_get((before.code == Code.RUNNING, command, fall))
@@ -72,7 +73,7 @@ def test_missions_succeed_before_a_strict_referee(walked):
 
 
 def test_feet_are_placed_where_they_count():
-    assert not PROGRAM.footing
+    assert not SPEC.footing
     for name in EXECUTORS:
         config = MissionConfig(executor=name)
-        assert program(config, (1.8, 1.4)).footing == (name != "kinematic")
+        assert mission_spec(config, (1.8, 1.4)).footing == (name != "kinematic")

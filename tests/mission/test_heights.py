@@ -7,8 +7,8 @@ import pytest
 from jaxbiped.arenas.scene import SceneConfig, to_arena
 from jaxbiped.mission.oracle import oracle_plan
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig
-from tests.mission.conftest import ARENAS, CONFIG, PROGRAM, SETTINGS, pad, play
+from jaxbiped.mission.params import MissionConfig
+from tests.mission.conftest import ARENAS, CONFIG, POINTS, SPEC, pad, play
 
 MARKS = tuple(
     {"kind": "circle", "at": at} for at in ((0.55, 0.12), (0.55, 1.28), (1.05, 0.12), (1.05, 1.28), (1.7, 0.35))
@@ -29,7 +29,7 @@ def ended():
     """Height and length of a bar to the codes of its missions."""
     cases = [(top, WHOLE) for top in (*HONEST, *FALSE)] + [(top, HALF) for top in FALSE]
     arenas = [arena(*case) for case in cases]
-    setting = jax.device_get(CONFIG.settings("full"))
+    setting = jax.device_get(CONFIG.params("full"))
     codes = play(
         [each for each in arenas for _ in range(SEEDS)],
         [setting] * (SEEDS * len(cases)),
@@ -53,15 +53,15 @@ def test_what_is_no_step_is_walked_round(ended):
 
 def test_perfect_knowledge_goes_by_the_same_rule():
     arenas = pad([arena(top, WHOLE) for top in (*HONEST, *FALSE)], ARENAS)
-    setting = pad([jax.device_get(CONFIG.settings("full"))], SETTINGS)
-    reachable = np.asarray(oracle_plan(arenas, setting, PROGRAM).reachable)[0, : len(HONEST) + len(FALSE)]
+    setting = pad([jax.device_get(CONFIG.params("full"))], POINTS)
+    reachable = np.asarray(oracle_plan(arenas, setting, SPEC).reachable)[0, : len(HONEST) + len(FALSE)]
     assert reachable.tolist() == [True] * len(HONEST) + [False] * len(FALSE)
 
 
 def test_the_tolerance_of_the_map_is_that_of_the_executor():
     strict = MissionConfig(limits={"height_tolerance": 0.004})
     assert strict.robot.height_tolerance == 0.004
-    assert strict.settings("full").body.height_tolerance == pytest.approx(0.004)
+    assert strict.params("full").body.height_tolerance == pytest.approx(0.004)
     own = MissionConfig(limits={"height_tolerance": 0.004}, robot={"height_tolerance": 0.006})
     assert own.robot.height_tolerance == 0.006 and own.limits.height_tolerance == 0.004
     assert MissionConfig().robot.height_tolerance == MissionConfig().limits.height_tolerance

@@ -11,11 +11,11 @@ from jaxbiped.core.names import STRATEGIES
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.oracle import oracle_plan
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.planning import Costs, Rules
 from jaxbiped.study.evaluation import draw
-from tests.mission.conftest import CONFIG, PROGRAM, pad, play, row
+from tests.mission.conftest import CONFIG, SPEC, pad, play, row
 from tests.reference import mapping, motion, planning
 
 POPULATION = 24
@@ -24,24 +24,24 @@ POPULATION = 24
 @pytest.fixture(scope="module")
 def plans(population):
     """Oracle plans [strategy, arena] of the population."""
-    points = jax.tree.map(jnp.asarray, stack([CONFIG.settings(name) for name in STRATEGIES]))
+    points = jax.tree.map(jnp.asarray, stack([CONFIG.params(name) for name in STRATEGIES]))
     arenas = jax.tree.map(jnp.asarray, pad(population[0], POPULATION))
-    return jax.device_get(oracle_plan(arenas, points, PROGRAM))
+    return jax.device_get(oracle_plan(arenas, points, SPEC))
 
 
 def true_grid(arena):
     boxes = arena.boxes
     rows = zip(boxes.x, boxes.y, boxes.yaw, boxes.half_x, boxes.half_y, boxes.bottom, boxes.top, boxes.overhead,
                boxes.used, strict=True)  # fmt: skip
-    body = jax.device_get(CONFIG.settings("full")).body
-    return mapping.truth_grid([box[:-1] for box in rows if box[-1]], PROGRAM.spec, body)
+    body = jax.device_get(CONFIG.params("full")).body
+    return mapping.truth_grid([box[:-1] for box in rows if box[-1]], SPEC.grid, body)
 
 
 def test_costs_are_those_of_dijkstra_on_the_true_grid(population, plans):
     for k in range(0, POPULATION, 2):
         arena = population[0][k]
         classes, levels = true_grid(arena)
-        start, goal = (motion.cell_of(*at, PROGRAM.spec) for at in (arena.start_xyyaw[:2], arena.goal_xy))
+        start, goal = (motion.cell_of(*at, SPEC.grid) for at in (arena.start_xyyaw[:2], arena.goal_xy))
         for p, strategy in enumerate(map(find_strategy, STRATEGIES)):
             if strategy.blind:
                 continue
@@ -52,10 +52,10 @@ def test_costs_are_those_of_dijkstra_on_the_true_grid(population, plans):
 
 def test_plans_are_the_same_in_any_batch():
     """To the last bit: a length that is summed would depend on how a batch of its size is added up."""
-    points = jax.tree.map(jnp.asarray, stack([CONFIG.settings(name) for name in ("full", "floor_only")]))
+    points = jax.tree.map(jnp.asarray, stack([CONFIG.params(name) for name in ("full", "floor_only")]))
     arenas, _ = draw(jax.random.key(0), jnp.arange(48), FAMILIES)
-    whole = jax.device_get(oracle_plan(arenas, points, PROGRAM))
-    part = jax.device_get(oracle_plan(jax.tree.map(lambda leaf: leaf[:3], arenas), points, PROGRAM))
+    whole = jax.device_get(oracle_plan(arenas, points, SPEC))
+    part = jax.device_get(oracle_plan(jax.tree.map(lambda leaf: leaf[:3], arenas), points, SPEC))
     jax.tree.map(lambda a, b: np.testing.assert_array_equal(a, b[:, :3]), part, whole)
 
 
@@ -74,9 +74,9 @@ def test_blind_way_is_reachable_only_over_floor():
     scenes = [
         to_arena(SceneConfig(name="test", start=(0.375, 0.675, 0.0), goal=(1.425, 0.675), boxes=each)) for each in boxes
     ]
-    points = jax.tree.map(jnp.asarray, stack([CONFIG.settings(name) for name in STRATEGIES]))
+    points = jax.tree.map(jnp.asarray, stack([CONFIG.params(name) for name in STRATEGIES]))
     arenas = jax.tree.map(jnp.asarray, pad([jax.device_get(scene) for scene in scenes], POPULATION))
-    plan = jax.device_get(oracle_plan(arenas, points, PROGRAM))
+    plan = jax.device_get(oracle_plan(arenas, points, SPEC))
     blind, full = (list(STRATEGIES).index(name) for name in ("blind_stop", "full"))
     assert plan.reachable[blind, :4].tolist() == [True, True, False, False]
     assert plan.reachable[full, :4].all()
@@ -86,15 +86,15 @@ def test_blind_way_is_reachable_only_over_floor():
 def test_robot_that_sees_everything_reaches_what_can_be_reached():
     """All but one in twenty: a cell that a box only grazes may be classed otherwise than in the true grid."""
     config = MissionConfig(sensor="oracle")
-    static = program(config, (SIZE_X, SIZE_Y))
+    spec = mission_spec(config, (SIZE_X, SIZE_Y))
     names = ("full", "bump_aware", "gate_aware", "floor_only")
-    points = [config.settings(name) for name in names]
+    points = [config.params(name) for name in names]
     batch, seeds = draw(jax.random.key(3), jnp.arange(24), FAMILIES)
-    plan = jax.device_get(oracle_plan(batch, jax.tree.map(jnp.asarray, stack(points)), static))
+    plan = jax.device_get(oracle_plan(batch, jax.tree.map(jnp.asarray, stack(points)), spec))
     solvable = np.argwhere(plan.reachable)
     point, arena = solvable[np.linspace(0, len(solvable) - 1, 32).astype(int)].T
     batch, seeds, points = jax.device_get((batch, seeds, points))
-    result = play([row(batch, k) for k in arena], [points[p] for p in point], list(seeds[arena]), static)
+    result = play([row(batch, k) for k in arena], [points[p] for p in point], list(seeds[arena]), spec)
     failed = [(int(k), names[p], Code(int(c)).name) for k, p, c in zip(arena, point, result.code, strict=True) if c]
     assert len(failed) <= 2, failed
     assert set(point.tolist()) == {0, 1, 2, 3}

@@ -7,7 +7,7 @@ import pytest
 
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.outcome import Code
-from tests.mission.conftest import PROGRAM
+from tests.mission.conftest import SPEC
 from tests.mission.replay import BORDER, Close, replay
 from tests.reference import mission as reference
 
@@ -28,8 +28,8 @@ ON_BUMPS = 14  # number of a mission that meets many
 @pytest.fixture(scope="session")
 def plain(population):
     """The population's missions by the reference."""
-    arenas, settings, seeds, _ = population
-    return [reference.run(*each, PROGRAM, keep=True) for each in zip(arenas, settings, seeds, strict=True)]
+    arenas, params, seeds, _ = population
+    return [reference.run(*each, SPEC, keep=True) for each in zip(arenas, params, seeds, strict=True)]
 
 
 def same_command(step, log, t):
@@ -79,7 +79,7 @@ def replayed(population, stepped):
 def replays(log, arena, setting):
     """What was close in each decision of one mission."""
     maps = [None, *(moment.grid_map for moment in log.moments[:-1])]
-    return [replay(*each, arena, setting, PROGRAM) for each in zip(log.moments, maps, strict=True)]
+    return [replay(*each, arena, setting, SPEC) for each in zip(log.moments, maps, strict=True)]
 
 
 def test_every_count_is_the_same_but_for_what_lies_on_a_border(replayed):
@@ -141,9 +141,9 @@ def spoil(moment, before, what):
 def test_one_thing_that_no_rounding_explains_is_seen(population, stepped, what):
     before, moment = stepped[0].moments[1:3]
     arena, setting = (each[0] for each in population[:2])
-    replay(moment, before.grid_map, arena, setting, PROGRAM)
+    replay(moment, before.grid_map, arena, setting, SPEC)
     with pytest.raises(AssertionError):
-        replay(spoil(moment, before.grid_map, what), before.grid_map, arena, setting, PROGRAM)
+        replay(spoil(moment, before.grid_map, what), before.grid_map, arena, setting, SPEC)
 
 
 @pytest.mark.parametrize("name, by", [("step_tolerance", 0.001), ("height_tolerance", -0.002), ("step", 0.004)])

@@ -21,10 +21,10 @@ MOST = 0.8  # of them reach the goal
 def outcomes():
     """Name of a scene to the results of its missions."""
     arenas = {name: jax.device_get(load_scene(FOLDER / f"{name}.toml")[1]) for name in SCENES}
-    settings = {name: jax.device_get(CONFIG.settings(name)) for name in set(STRATEGY.values())}
+    params = {name: jax.device_get(CONFIG.params(name)) for name in set(STRATEGY.values())}
     names = [name for name in SCENES for _ in range(SEEDS)]
     seeds = [100 + k for k in range(len(names))]
-    result = play([arenas[name] for name in names], [settings[STRATEGY[name]] for name in names], seeds)
+    result = play([arenas[name] for name in names], [params[STRATEGY[name]] for name in names], seeds)
     return {name: row(result, slice(SEEDS * k, SEEDS * (k + 1))) for k, name in enumerate(SCENES)}
 
 

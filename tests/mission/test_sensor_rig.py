@@ -13,22 +13,24 @@ from jaxbiped.arenas.scene import load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.mission_step import sense, step
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensor_rig import rig_for, where
 from jaxbiped.mission.sensors import RayCast
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.sensing import camera as cameras
 from jaxbiped.study.hosted import run_on_host
-from tests.mission.conftest import CONFIG, PROGRAM
+from jaxbiped.study.workload import Workload
+from tests.mission.conftest import CONFIG, SPEC
 
-by_ray_cast = jax.jit(jax.vmap(partial(sense, program=PROGRAM, carriage=None)))
+by_ray_cast = jax.jit(jax.vmap(partial(sense, body_pose=None)))
 
 
 class Mirror:
     """SensorRig that measure on the host what the ray-cast sensor would inside the loop."""
 
-    def see(self, world, mind, arena, settings, carriage=None, count=None):
-        return jax.device_get(by_ray_cast(world, mind, arena, settings))
+    def see(self, world, agent, setup, body_pose=None, count=None):
+        return jax.device_get(by_ray_cast(world, agent, setup))
 
     def picture(self):
         return None
@@ -41,9 +43,7 @@ def test_missions_that_are_given_what_they_see(population, played):
     points = stack(population[1][:1])
     ended = []
     opened = lambda: nullcontext(Mirror())  # noqa: E731
-    result = run_on_host(
-        batch, jnp.asarray(seeds), points, 2, PROGRAM, ended.append, opened, population_of=np.zeros(1, int)
-    )
+    result = run_on_host(Workload(batch, jnp.asarray(seeds), points, 2, SPEC), ended.append, opened)
     for k in np.flatnonzero([setting is population[1][0] for setting in population[1][:2]]):
         for name in ("code", "measurements", "decisions"):
             assert getattr(result, name)[0, k] == getattr(played, name)[k], name
@@ -53,25 +53,23 @@ def test_missions_that_are_given_what_they_see(population, played):
 
 
 def test_eyes_that_cannot_be_opened_end_all_missions(first_look):
-    _, _, arena, settings = first_look
+    setup = first_look[2]
     tried = []
 
     def broken():
         tried.append(1)
         raise InputError("nothing can be rendered", field="sensor")
 
-    batch = jax.tree.map(lambda leaf: jnp.repeat(leaf, 9, axis=0), arena)
+    batch = jax.tree.map(lambda leaf: jnp.repeat(leaf, 9, axis=0), setup.arena)
     with pytest.raises(InputError, match="nothing can be rendered"):
-        run_on_host(
-            batch, jnp.zeros(9, jnp.uint32), settings, 9, PROGRAM, print, broken, population_of=np.zeros(1, int)
-        )
+        run_on_host(Workload(batch, jnp.zeros(9, jnp.uint32), setup.params, 9, SPEC), print, broken)
     assert 1 <= len(tried) <= 2
 
 
 def test_loop_does_not_stand_in_for_a_sensor_on_the_host(first_look):
-    static = replace(PROGRAM, sensor="stereo")
+    world, agent, setup = first_look
     with pytest.raises(ValueError, match="given their views"):
-        jax.eval_shape(partial(step, program=static), *first_look)
+        jax.eval_shape(step, world, agent, replace(setup, spec=replace(SPEC, sensor="stereo")))
 
 
 def test_rendered_stereo_has_a_rule_for_far_walls_of_its_own():
@@ -79,9 +77,9 @@ def test_rendered_stereo_has_a_rule_for_far_walls_of_its_own():
     parts = {"stereo": {}, "fewer": {"mapping": {"below_points": 20}}, "none": {"mapping": {"below_points": None}}}
     found = {name: MissionConfig(sensor="stereo", **part).mapping.below_points for name, part in parts.items()}
     assert found == {"stereo": 50, "fewer": 20, "none": None}
-    assert MissionConfig().settings("full").mapping.below_points is None
+    assert MissionConfig().params("full").mapping.below_points is None
     cast = MissionConfig(sensor="stereo").model_copy(update={"sensor": "raycast"})  # as `fit-sensor` compares them
-    assert cast.settings("full").mapping.below_points == 50
+    assert cast.params("full").mapping.below_points == 50
 
 
 def test_jax_sensors_need_no_eyes():
@@ -90,17 +88,17 @@ def test_jax_sensors_need_no_eyes():
 
 @pytest.fixture(scope="module")
 def first_look(request):
-    """World, mind, arena and settings of one mission before its first measurement."""
+    """World, agent and setup of one mission before its first measurement."""
     _, arena = load_scene(request.config.rootpath / "configs" / "scenes" / "experiment_6.toml")
-    settings = MissionConfig(sensor="stereo").settings("full")
-    world, mind = start(arena, settings, jnp.uint32(7), PROGRAM.spec)
-    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (world, mind, arena, settings))
+    params = MissionConfig(sensor="stereo").params("full")
+    setup = MissionSetup(arena, params, SPEC)
+    return jax.tree.map(lambda leaf: jnp.asarray(leaf)[None], (*start(setup, jnp.uint32(7)), setup))
 
 
 def test_camera_is_where_the_ray_cast_sensor_has_it(first_look):
     """Place, tilt and seed are those that `sense` uses: the centre of a robot upright, turned by at most a few sd."""
-    world, mind, _, settings = first_look
-    origin, basis, at, _ = where(world, mind, settings, None)
+    world, agent, setup = first_look
+    origin, basis, at, _ = where(world, agent, setup.params, None)
     pose, at = jax.tree.map(lambda v: v[0], (world.pose, at))
     level = cameras.placed(pose, at, 0 * at.pitch, 0 * at.pitch)
     np.testing.assert_allclose(origin[0], level[0], atol=0.365 * 4 * np.deg2rad(0.3))
@@ -116,8 +114,8 @@ def test_rendered_view_agrees_with_the_ray_cast_one(first_look):
         again, _ = rig.see(*first_look)
     finally:
         rig.close()
-    world, mind, arena, settings = first_look
-    cast, _ = by_ray_cast(world, mind, arena, replace(settings, sensor=RayCast()))
+    world, agent, setup = first_look
+    cast, _ = by_ray_cast(world, agent, replace(setup, params=replace(setup.params, sensor=RayCast())))
     assert np.array_equal(seen.z, again.z)
     for view in (seen, cast):
         near = (np.asarray(view.weight[0]) > 0) & (np.abs(view.x[0] - 0.35) < 0.05) & (np.abs(view.y[0]) < 0.1)

@@ -13,17 +13,18 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.batched_driver import Jobs, stack
 from jaxbiped.mission.metrics import Energy
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.params import MissionConfig, mission_spec
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.simulated_driver import walk, walk_logged
-from jaxbiped.mission.simulated_step import execute
+from jaxbiped.mission.simulated_step import PlanEnd, execute
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing.config import CameraConfig
 
 SIZE = (0.9, 0.6)
 CONFIG = MissionConfig(executor="native", camera=CameraConfig(columns=32, rows=24), walk={"threads": 1})
-PROGRAM = program(CONFIG, SIZE)
-SETTINGS = replace(CONFIG.settings("full"), metrics=(Energy(),))
+SPEC = mission_spec(CONFIG, SIZE)
+PARAMS = replace(CONFIG.params("full"), metrics=(Energy(),))
 MARKS = ({"kind": "circle", "at": (0.85, 0.1)}, {"kind": "circle", "at": (0.85, 0.5)})
 
 
@@ -40,11 +41,11 @@ ARENAS = [AHEAD, ASIDE, BUMP]
 
 def play(which, slots, config=CONFIG, observer=None):
     """Missions k in arenas `which`, with seed k."""
-    arenas, settings = (jax.tree.map(jnp.asarray, stack(trees)) for trees in (ARENAS, [SETTINGS]))
+    arenas, params = (jax.tree.map(jnp.asarray, stack(trees)) for trees in (ARENAS, [PARAMS]))
     count = len(which)
     jobs = Jobs(np.array(which), np.zeros(count, int), np.array(which, np.uint32), jnp.int32(count))
     walking = config.walk.model_copy(update={"slots": slots})
-    return walk(arenas, settings, jobs, program(config, SIZE), walking, observer=observer)
+    return walk(MissionSetup(arenas, params, mission_spec(config, SIZE)), jobs, walking, observer=observer)
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +104,7 @@ def test_nobody_waits_for_another():
 
 def test_logged_mission_is_that_of_the_queue(together):
     seen = []
-    mission = walk_logged(BUMP, SETTINGS, jnp.uint32(2), PROGRAM, CONFIG.walk, seen.append)
+    mission = walk_logged(MissionSetup(BUMP, PARAMS, SPEC), jnp.uint32(2), CONFIG.walk, seen.append)
     assert mission.code == together.code[2]
     assert mission.distance == together.distance[2]
     assert mission.time == mission.played[-1].time == together.time[2]
@@ -115,7 +116,7 @@ def test_logged_mission_is_that_of_the_queue(together):
 
 def test_a_wall_that_cannot_be_seen_is_a_collision():
     plain = arena((0.25, 0.3, 0.0), (0.75, 0.3), BoxConfig(centre=(0.5, 0.3), size=(0.1, 0.6), top=0.4, contrast=0.0))
-    mission = walk_logged(plain, SETTINGS, jnp.uint32(0), PROGRAM, CONFIG.walk)
+    mission = walk_logged(MissionSetup(plain, PARAMS, SPEC), jnp.uint32(0), CONFIG.walk)
     assert mission.code == Code.COLLIDED
     assert 0.05 < mission.distance < 0.25
 
@@ -123,29 +124,30 @@ def test_a_wall_that_cannot_be_seen_is_a_collision():
 def test_a_hole_that_cannot_be_seen_is_a_fall():
     """A robot on a plain table, whose edge no camera measures, walks over it."""
     table = arena((0.25, 0.3, 0.0), (0.75, 0.3), BoxConfig(centre=(0.2, 0.3), size=(0.4, 0.6), top=0.12, contrast=0.0))
-    mission = walk_logged(table, SETTINGS, jnp.uint32(0), PROGRAM, CONFIG.walk)
+    mission = walk_logged(MissionSetup(table, PARAMS, SPEC), jnp.uint32(0), CONFIG.walk)
     assert mission.code == Code.FELL
 
 
 def test_a_mission_that_is_over_before_it_began():
     there = arena((0.3, 0.3, 0.0), (0.35, 0.3))
-    mission = walk_logged(there, SETTINGS, jnp.uint32(0), PROGRAM, CONFIG.walk)
+    mission = walk_logged(MissionSetup(there, PARAMS, SPEC), jnp.uint32(0), CONFIG.walk)
     assert (mission.code, mission.distance, mission.played) == (Code.REACHED, 0.0, ())
 
 
 def test_odometry_counts_what_really_happened():
-    world, _ = start(AHEAD, SETTINGS, jnp.uint32(0), PROGRAM.spec)
+    world, _ = start(MissionSetup(AHEAD, PARAMS, SPEC), jnp.uint32(0))
     after = Pose(*(jnp.float32(v) for v in (0.30, 0.31, 0.0, 0.2)))
     no = jnp.zeros((), bool)
     command = Command(jnp.float32(0), jnp.int32(1), jnp.float32(0.05), jnp.int32(0), no, jnp.float32(0))
-    settings = replace(SETTINGS, odometry=jax.tree.map(jnp.zeros_like, SETTINGS.odometry))  # exact
-    executed = execute(world, command, after, no, no, AHEAD, settings)
+    params = replace(PARAMS, odometry=jax.tree.map(jnp.zeros_like, PARAMS.odometry))  # exact
+    setup = MissionSetup(AHEAD, params, SPEC)
+    executed = execute(world, command, PlanEnd(after, no, no), setup)
     np.testing.assert_allclose(executed.moved, [0.05, 0.01, 0.2], atol=1e-6)
     assert float(executed.distance) == pytest.approx(np.hypot(0.05, 0.01))
     assert float(executed.time) == 16.0  # Table 2's
     assert not bool(executed.outside)
     beyond = replace(after, x=jnp.float32(SIZE[0] + 0.01))
-    assert bool(execute(world, command, beyond, no, no, AHEAD, settings).outside)
+    assert bool(execute(world, command, PlanEnd(beyond, no, no), setup).outside)
 
 
 def test_a_gpu_that_is_not_there_is_an_input_error():
@@ -169,6 +171,6 @@ def test_mjx_reaches_the_goals_too(together):
 def test_the_papers_experiments_are_solved_without_a_fall_or_a_touch(number, request):
     _, scene = load_scene(request.config.rootpath / f"configs/scenes/experiment_{number}.toml")
     config = MissionConfig(executor="native")
-    settings = config.settings("floor_only" if number == 4 else "full")
-    static = program(config, tuple(round(float(v), 6) for v in scene.size_xy))
-    assert walk_logged(scene, settings, jnp.uint32(0), static, config.walk).code == Code.REACHED
+    params = config.params("floor_only" if number == 4 else "full")
+    spec = mission_spec(config, tuple(round(float(v), 6) for v in scene.size_xy))
+    assert walk_logged(MissionSetup(scene, params, spec), jnp.uint32(0), config.walk).code == Code.REACHED

@@ -11,7 +11,7 @@ from jaxbiped.mission.simulated_step import BACK, back_off, feel, hindered
 from jaxbiped.mission.state import AgentState
 from jaxbiped.motion.primitives import Command
 
-SPEC = GridSpec(size_x=0.6, size_y=0.45)
+GRID = GridSpec(size_x=0.6, size_y=0.45)
 
 
 def command(turn=0.0, length=0.0, left=0.0, rise=0):
@@ -37,19 +37,19 @@ def test_hindered_is_what_did_not_come_to_where_it_was_led():
 
 
 def test_what_was_felt_is_an_obstacle_ahead():
-    mind = felt_at(Pose(*jnp.array([0.225, 0.225, 0.0, 0.0])), length=0.05)
-    classes, _ = classify(mind.grid_map, MapConfig().params(), SPEC)
+    agent = felt_at(Pose(*jnp.array([0.225, 0.225, 0.0, 0.0])), length=0.05)
+    classes, _ = classify(agent.grid_map, MapConfig().params(), GRID)
     obstacles = np.argwhere(np.asarray(classes) == Cell.OBSTACLE)
     assert obstacles.tolist() == [[4, 5]]
     beyond = felt_at(Pose(*jnp.array([0.225, 0.225, 0.0, 0.0])), length=0.005)  # comes to stand in its own cell
-    classes, _ = classify(beyond.grid_map, MapConfig().params(), SPEC)
+    classes, _ = classify(beyond.grid_map, MapConfig().params(), GRID)
     assert np.argwhere(np.asarray(classes) == Cell.OBSTACLE).tolist() == [[4, 5]]
 
 
 def felt_at(pose, length):
-    """The mind of a robot at `pose` after its feet were stopped."""
-    mind = AgentState(belief=Belief(pose, jnp.eye(3)), grid_map=empty(SPEC), **dict.fromkeys(BARE))
-    return feel(mind, pose, Command(*(leaf[0] for leaf in vars(command(length=length)).values())), SPEC)
+    """The agent of a robot at `pose` after its feet were stopped."""
+    agent = AgentState(belief=Belief(pose, jnp.eye(3)), grid_map=empty(GRID), **dict.fromkeys(BARE))
+    return feel(agent, pose, Command(*(leaf[0] for leaf in vars(command(length=length)).values())), GRID)
 
 
 BARE = set(AgentState.__dataclass_fields__) - {"belief", "grid_map"}

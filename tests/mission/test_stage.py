@@ -7,8 +7,9 @@ import pytest
 
 from jaxbiped.biped import request as ask
 from jaxbiped.errors import InputError
+from jaxbiped.executors.config import WalkConfig
+from jaxbiped.executors.primitive_schedule import targets
 from jaxbiped.geometry.boxes import Boxes
-from jaxbiped.mission.primitive_schedule import WalkConfig, targets
 from jaxbiped.mission.stage import Stage, nearest
 
 ROBOT = WalkConfig().biped

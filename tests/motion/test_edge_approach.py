@@ -11,6 +11,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.motion import edge_approach as room
 from jaxbiped.motion.config import FootingConfig
+from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing import edges
 
@@ -26,13 +27,13 @@ def ground(first=18, last=36, level=1):
     return jnp.asarray(classes), jnp.asarray(levels)
 
 
-def at(x, y=0.725, yaw=0.0, z=0.0):
-    return Pose(*(jnp.float32(v) for v in (x, y, z, yaw))), jnp.array([int(y / 0.05), int(x / 0.05)])
+def at(x, y=0.725, yaw=0.0, z=0.0, maps=None):
+    pose, ij = Pose(*(jnp.float32(v) for v in (x, y, z, yaw))), jnp.array([int(y / 0.05), int(x / 0.05)])
+    return LocalMap(*(maps or ground()), ij, pose, SPEC)
 
 
 def crossing_of(x, yaw=0.0, moves=(0,) * MOVES, maps=None):
-    pose, ij = at(x, yaw=yaw)
-    return room.next_crossing(pose, ij, jnp.array(moves), *(maps or ground()), SPEC)
+    return room.next_crossing(at(x, yaw=yaw, maps=maps), jnp.array(moves))
 
 
 def line(distance, angle=0.0, rise=1, sd=0.001, known=True):
@@ -81,16 +82,13 @@ def test_what_was_measured_is_remembered_while_it_fits():
 STRAIGHT = Command(*(jnp.asarray(v) for v in (0.0, 1, 0.05, 0, False)), left=jnp.zeros(()))
 
 
-def command(pose, ij, crossing, measured, maps, held=None, behind=None, looked=False, wanted=STRAIGHT):
-    got = room.approach(wanted, pose, ij, crossing, measured, held or edges.unknown(), behind or edges.unknown(),
-                        *maps, jnp.asarray(looked), FOOTING, SPEC)  # fmt: skip
-    return jax.device_get(got)
+def command(local, crossing, measured, held=None, behind=None, looked=False, wanted=STRAIGHT):
+    near = room.NearEdges(measured, held or edges.unknown(), behind or edges.unknown())
+    return jax.device_get(room.approach(wanted, local, crossing, near, jnp.asarray(looked), FOOTING))
 
 
 def decide(x, distance, angle=0.0, sd=0.001, **more):
-    maps = ground()
-    pose, ij = at(x, yaw=-angle)
-    return command(pose, ij, crossing_of(x, yaw=-angle), line(distance, angle, sd=sd), maps, **more)
+    return command(at(x, yaw=-angle), crossing_of(x, yaw=-angle), line(distance, angle, sd=sd), **more)
 
 
 def test_far_from_an_edge_it_follows_its_path():
@@ -124,38 +122,38 @@ def test_it_steps_aside_for_both_feet_to_land():
     """The bump ends 4 cm to the right of the way."""
     classes, levels = ground()
     classes, levels = classes.at[:14].set(Cell.FLOOR), levels.at[:14].set(0)
-    pose, ij = at(0.775, y=0.74)
-    crossing = room.next_crossing(pose, ij, jnp.zeros(MOVES, jnp.int32), classes, levels, SPEC)
-    got = command(pose, ij, replace(crossing, edge=line(0.125)), line(0.125), (classes, levels))
+    local = at(0.775, y=0.74, maps=(classes, levels))
+    crossing = room.next_crossing(local, jnp.zeros(MOVES, jnp.int32))
+    got = command(local, replace(crossing, edge=line(0.125)), line(0.125))
     assert got.primitive == Primitive.NONE and 0.03 < got.left <= 0.1 and got.length == 0
 
 
 def test_after_a_step_it_leaves_the_edge_before_it_turns():
-    maps, (pose, ij) = ground(), at(0.925, z=0.03)
+    local = at(0.925, z=0.03)
     nowhere = crossing_of(0.525)
     turning = replace(STRAIGHT, turn=jnp.asarray(1.5))
-    got = command(pose, ij, nowhere, edges.unknown(), maps, behind=line(-0.025), wanted=turning)
+    got = command(local, nowhere, edges.unknown(), behind=line(-0.025), wanted=turning)
     assert got.turn == 0 and got.length == pytest.approx(CONFIG.clear_up - 0.025, abs=1e-6)
-    got = command(pose, ij, nowhere, edges.unknown(), maps, behind=line(-0.08), wanted=turning)
+    got = command(local, nowhere, edges.unknown(), behind=line(-0.08), wanted=turning)
     assert got.turn == pytest.approx(1.5)
 
 
 def test_it_does_not_turn_away_from_an_edge_with_its_toes_at_it():
-    maps, (pose, ij) = ground(), at(0.825)
+    local = at(0.825)
     turning = replace(STRAIGHT, turn=jnp.asarray(1.0))
-    got = command(pose, ij, crossing_of(0.525), edges.unknown(), maps, held=line(0.075), wanted=turning)
+    got = command(local, crossing_of(0.525), edges.unknown(), held=line(0.075), wanted=turning)
     assert got.turn == 0 and got.length < 0
 
 
 @jax.jit
 def decision(x, y, z, yaw, truth, behind, looked, classes, levels, moves):
     """What the robot does at a true pose, with the edge measured as it is."""
-    pose = Pose(x, y, z, yaw)
     ij = jnp.stack([y, x]) // 0.05
-    crossing = room.next_crossing(pose, ij.astype(jnp.int32), moves, classes, levels, SPEC)
+    local = LocalMap(classes, levels, ij.astype(jnp.int32), Pose(x, y, z, yaw), SPEC)
+    crossing = room.next_crossing(local, moves)
     measured = replace(truth, known=crossing.edge.known)
-    return room.approach(STRAIGHT, pose, ij.astype(jnp.int32), crossing, measured, measured, behind, classes, levels,
-                         looked, FOOTING, SPEC)  # fmt: skip
+    near = room.NearEdges(measured, measured, behind)
+    return room.approach(STRAIGHT, local, crossing, near, looked, FOOTING)
 
 
 @pytest.mark.parametrize("noisy", [False, True])

@@ -7,12 +7,13 @@ import pytest
 
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Cell, GridSpec
+from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.primitives import Primitive
 from jaxbiped.motion.selection import TURN_DEADBAND, cell_of, select, stride
 from tests.reference import motion as plain
 
 PAPER, FINE = GridSpec(), GridSpec(pitch=0.025)
-COMPILED = jax.jit(select, static_argnames=("spec",))
+COMPILED = jax.jit(select)
 
 
 def command(spec, moves, *, at=None, yaw=0.0, ij=(10, 10), edits=(), looked=False):
@@ -22,8 +23,8 @@ def command(spec, moves, *, at=None, yaw=0.0, ij=(10, 10), edits=(), looked=Fals
         classes[i, j], levels[i, j] = kind, level
     at = at or ((ij[1] + 0.5) * spec.pitch, (ij[0] + 0.5) * spec.pitch)
     x, y, z, yaw = (jnp.float32(v) for v in (*at, 0.0, yaw))
-    arrays = (jnp.asarray(a) for a in (np.int32(ij), np.int32(moves), classes, levels, np.bool_(looked)))
-    return jax.device_get(COMPILED(Pose(x, y, z, yaw), *arrays, spec=spec))
+    ij, moves, classes, levels, looked = map(jnp.asarray, (np.int32(ij), np.int32(moves), classes, levels, looked))
+    return jax.device_get(COMPILED(LocalMap(classes, levels, ij, Pose(x, y, z, yaw), spec), moves, looked))
 
 
 def test_stride():

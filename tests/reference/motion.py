@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from jaxbiped.executors.execution import CHECKS, ODOMETRY, TOUCH
 from jaxbiped.mapping.grid import Cell
-from jaxbiped.mission.executors import CHECKS, ODOMETRY, TOUCH
 from jaxbiped.motion.edge import WINDOW
 from jaxbiped.motion.grid_units import CELL, EIGHTH
 from jaxbiped.motion.primitives import Primitive

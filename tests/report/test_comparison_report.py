@@ -8,7 +8,7 @@ from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.report.comparison_report import QUESTION_TEXT
 from jaxbiped.report.folder_report import write_report
-from jaxbiped.study import create, store
+from jaxbiped.study import StudyHeader, create, store
 from tests.study.synthetic import rows
 
 FRAME = rows(60)
@@ -19,7 +19,7 @@ class Config(Model):
 
 
 def study(folder, frame=FRAME, finish=True):
-    with create(folder, Config(), seed=3, arenas=60, command="jaxbiped compare --arenas 60") as results:
+    with create(folder, StudyHeader(Config(), seed=3, arenas=60, command="jaxbiped compare --arenas 60")) as results:
         results.append(frame)
         if finish:
             results.finish(compile_time=2.0)
@@ -67,7 +67,7 @@ def test_what_cannot_be_reported_is_named(tmp_path):
     folder = study(tmp_path / "r")
     with pytest.raises(InputError, match="point"):
         write_report(folder, point=4)
-    with create(tmp_path / "empty", Config(), seed=3, arenas=60) as results:
+    with create(tmp_path / "empty", StudyHeader(Config(), seed=3, arenas=60)) as results:
         results.finish()
     with pytest.raises(InputError, match="has no rows"):
         write_report(tmp_path / "empty")

@@ -13,7 +13,7 @@ from jaxbiped.report.folder_report import write_report
 from jaxbiped.report.grid import parsed, to_grid, typeset
 from jaxbiped.report.page_figures import attributed, attribution_sheet
 from jaxbiped.report.tables import Sheet
-from jaxbiped.study import create
+from jaxbiped.study import StudyHeader, create
 from tests.report.html_reader import Reader
 from tests.report.test_comparison_report import Config
 from tests.study.synthetic import rows
@@ -28,7 +28,7 @@ COMMAND = "jaxbiped compare --arenas 60 --out '<b>&x'"
 def page(tmp_path_factory) -> Path:
     """The page of a small study."""
     folder = tmp_path_factory.mktemp("page") / "r"
-    with create(folder, Config(), seed=3, arenas=60, command=COMMAND) as results:
+    with create(folder, StudyHeader(Config(), seed=3, arenas=60, command=COMMAND)) as results:
         results.append(rows(60))
         results.finish(compile_time=2.0)
     report = write_report(folder, resamples=50)

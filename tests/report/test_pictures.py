@@ -69,7 +69,7 @@ def drawn(grid, **what):
     """What the middle of each cell looks like once drawn, row 0 first."""
     figure = Figure(figsize=(4, 4 * grid.shape[0] / grid.shape[1]), dpi=100)
     ax = figure.add_axes((0, 0, 1, 1))
-    pictures.draw_map(ax, grid, **what)
+    pictures.draw_map(ax, grid, pictures.MapOverlay(**what))
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba())[..., :3]
@@ -88,7 +88,8 @@ def test_cells_are_drawn_where_they_are():
 def test_maps_of_any_size_are_drawn(shape, tmp_path):
     grid = ClassGrid(np.ones(shape, np.int8), np.zeros(shape, np.int8), np.zeros(2), 0.05)
     path = grid.centres_xy(np.argwhere(grid.classes)[:200])
-    pictures.save_map(tmp_path / "a.png", grid, plan_xy=path, start_xy=(0.0, 0.0), goal_xy=(0.02, 0.02), title="a")
+    overlay = pictures.MapOverlay(plan_xy=path, start_xy=(0.0, 0.0), goal_xy=(0.02, 0.02))
+    pictures.save_map(tmp_path / "a.png", grid, overlay, title="a")
     with Image.open(tmp_path / "a.png") as image:
         assert image.format == "PNG" and min(image.size) > 300
 
@@ -112,8 +113,8 @@ def test_the_legend_of_a_mission_names_all_that_is_drawn():
 def test_the_legend_of_a_map_that_somebody_brings_claims_no_growing(tmp_path, monkeypatch):
     grid, kept = ClassGrid(np.ones((3, 4), np.int8), np.zeros((3, 4), np.int8), np.zeros(2), 0.05), []
     monkeypatch.setattr(pictures, "save_figure", lambda figure, _: kept.append(figure))
-    pictures.save_map(tmp_path / "a.png", grid, goal_xy=(0.1, 0.1), goal_radius=None)
-    pictures.save_map(tmp_path / "a.png", grid, goal_xy=(0.1, 0.1))
+    pictures.save_map(tmp_path / "a.png", grid, pictures.MapOverlay(goal_xy=(0.1, 0.1), goal_radius=None))
+    pictures.save_map(tmp_path / "a.png", grid, pictures.MapOverlay(goal_xy=(0.1, 0.1)))
     assert "obstacle" in labels(kept[0]) and not any("reached" in said for said in labels(kept[0]))
     assert "reached within 10 cm" in labels(kept[1])
 
@@ -265,7 +266,7 @@ def test_holes_are_hatched(tmp_path):
     grid = ClassGrid(np.ones((14, 18), np.int8), np.zeros((14, 18), np.int8), np.zeros(2), 0.05)
     images = []
     for name, terrain in (("a", None), ("b", Ground(heights, np.zeros(2), 0.01))):
-        pictures.save_map(tmp_path / f"{name}.png", grid, terrain=terrain)
+        pictures.save_map(tmp_path / f"{name}.png", grid, pictures.MapOverlay(terrain=terrain))
         images.append(np.asarray(Image.open(tmp_path / f"{name}.png").convert("L"), int))
     rows, columns = np.nonzero(np.abs(images[0] - images[1]) > 50)
     assert len(rows) > 500

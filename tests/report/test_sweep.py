@@ -1,6 +1,6 @@
 """The report of a sweep: a figure that fits its axes, tables that say what the rows hold, and the whole command."""
 
-from functools import partial
+from contextlib import nullcontext
 
 import polars as pl
 import pytest
@@ -15,7 +15,7 @@ from jaxbiped.report.sweep import write_sweep_report
 from jaxbiped.report.sweep_figures import sweep_figure
 from jaxbiped.study import read_points, store
 from jaxbiped.study.batching import group_points, only_point, shards
-from jaxbiped.study.run_study import conduct, table
+from jaxbiped.study.run_study import Engine, compute_study, table
 from jaxbiped.study.sweep import SweepConfig
 from tests.study.synthetic import rows
 
@@ -41,7 +41,7 @@ def made_up(config, on_progress=None, *, points, done):
 def conducted(folder, **fields):
     """A sweep's folder."""
     config = parse(SweepConfig, {"arenas": 40, "strategies": PAIR} | fields)
-    conduct(folder, config, points=tuple(config.points()), engine=made_up)
+    compute_study(folder, config, points=tuple(config.points()), engine=Engine(made_up))
     return folder
 
 
@@ -100,7 +100,7 @@ def test_a_sweep_that_was_stopped_says_so(tmp_path):
             yield shard
 
     with pytest.raises(KeyboardInterrupt):
-        conduct(tmp_path / "r", config, points=tuple(config.points()), engine=stops)
+        compute_study(tmp_path / "r", config, points=tuple(config.points()), engine=Engine(stops))
     report = write_sweep_report(tmp_path / "r", resamples=99)
     assert report.result.points[0].success[PAIR[0]].n == 20
     assert "not finished" in (tmp_path / "r" / "summary.md").read_text()
@@ -108,7 +108,7 @@ def test_a_sweep_that_was_stopped_says_so(tmp_path):
 
 def test_the_command(tmp_path, monkeypatch, capsys):
     """From a file to its folder: all of it but the missions."""
-    monkeypatch.setattr(command, "conduct", partial(conduct, engine=made_up))
+    monkeypatch.setattr(command, "chosen_engine", lambda *_: nullcontext(Engine(made_up)))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.toml").write_text(
         'arenas = 12\nstrategies = ["bump_aware", "floor_only"]\n[[axes]]\nfield = "costs.c3"\nvalues = [5, 10, 20]\n'
@@ -153,7 +153,7 @@ def test_points_that_are_damaged_are_named(tmp_path):
 
 def test_points_of_a_study_that_sweeps_nothing(tmp_path):
     config = parse(SweepConfig, {"arenas": 6, "strategies": PAIR})
-    conduct(tmp_path / "r", config, engine=made_up)
+    compute_study(tmp_path / "r", config, engine=Engine(made_up))
     assert read_points(tmp_path / "r").to_dicts() == [{"point": 0}]
     assert table(tuple(config.points())).to_dicts() == [{"point": 0}]
 

@@ -13,7 +13,7 @@ from jaxbiped.report import Report, SweepReport, write_report
 from jaxbiped.report.folder_report import terminal_report
 from jaxbiped.report.sweep import write_sweep_report
 from jaxbiped.report.sweep_page import write_sweep_page
-from jaxbiped.study import create
+from jaxbiped.study import StudyHeader, create
 from tests.report.html_reader import Reader
 from tests.study.synthetic import rows
 from tests.study.test_stored_series import other, stored
@@ -33,7 +33,9 @@ def swept(folder, config, points, strategies=("full", "floor_only"), change=lamb
     table = table.with_columns(pl.col("point").cast(pl.Int32))
     frames = [other(rows(48, strategies=strategies), change(k)).with_columns(point=pl.lit(k, pl.Int32))
               for k in range(len(points))]  # fmt: skip
-    with create(folder, config, seed=0, arenas=48, points=table, command="jaxbiped sweep x.toml") as results:
+    with create(
+        folder, StudyHeader(config, seed=0, arenas=48, points=table, command="jaxbiped sweep x.toml")
+    ) as results:
         results.append(pl.concat(frames))
         results.finish(compile_time=1.0)
     return folder

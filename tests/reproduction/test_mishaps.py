@@ -6,7 +6,7 @@ import pytest
 from jaxbiped.arenas import load_scene
 from jaxbiped.errors import InputError
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.reproduction.mishaps import BLOCK, DROPPED_AFTER, GOAL, MISHAPS, START, arena_of, suffer
 
 CONFIG = MissionConfig()

@@ -8,8 +8,8 @@ import pytest
 from jaxbiped.mapping import Cell
 from jaxbiped.mission.log import MissionLog, Outline, Walk
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.recorded_driver import Mission
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.motion.config import RobotConfig
 from jaxbiped.reproduction import EXPERIMENTS, TABLE_1, fit_measuring
 from jaxbiped.reproduction.account import KINDS, Part, Record

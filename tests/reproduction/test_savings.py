@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.reproduction.paper import SAVED
 from jaxbiped.reproduction.savings import (
     CROSSES,

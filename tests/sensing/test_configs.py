@@ -6,7 +6,7 @@ import pytest
 
 from jaxbiped import config
 from jaxbiped.errors import InputError
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.sensing import PRESETS, CameraConfig, NoiseConfig, SensorConfig, sensor_preset
 
 CONFIGS = Path(__file__).parents[2] / "configs"

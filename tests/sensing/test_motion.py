@@ -11,7 +11,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation import Belief, predict
 from jaxbiped.localisation.kalman_filter import predict_seen
 from jaxbiped.sensing import VisualConfig
-from jaxbiped.sensing.camera import mount
+from jaxbiped.sensing.camera import MountedCamera, mount
 from jaxbiped.sensing.motion import SHARE, nothing, overlap, track
 from jaxbiped.sensing.view import Motion, View
 from tests.reference import sensing as reference
@@ -21,7 +21,7 @@ NOISE = VisualConfig(failure=0).traced()
 N = 400
 RANGE = 1.3  # [m]
 tracked = jax.jit(functools.partial(track, image=IMAGE))
-overlapped = jax.jit(functools.partial(overlap, image=IMAGE))
+overlapped = jax.jit(overlap)
 fused = jax.jit(predict_seen)
 
 
@@ -41,7 +41,7 @@ def floor_view(seed=0, valid=True) -> View:
 @pytest.mark.parametrize("after", [(0.85, 0.5, 0.0, 0.3), (0.8, 0.52, 0.03, 1.1), (0.8, 0.5, 0.0, -2.8)])
 def test_overlap_is_what_the_camera_before_measures(after, look):
     view, at = floor_view(), mount(CAMERA, look)
-    ours = float(overlapped(view, pose(*after), pose(), at, CAMERA, max_range=RANGE))
+    ours = float(overlapped(view, pose(*after), pose(), MountedCamera(CAMERA, at, IMAGE), RANGE))
     world = [np.asarray(v, float) for v in (view.x, view.y, view.z)]
     x, y, z, yaw = after
     cos, sin = np.cos(yaw), np.sin(yaw)
@@ -65,7 +65,7 @@ def test_errors_are_as_large_as_claimed():
     cos, sin = np.cos(0.3), np.sin(0.3)
     true = np.array([cos * 0.04 + sin * 0.03, -sin * 0.04 + cos * 0.03, 0.3])
     error = np.stack([found.x, found.y, found.yaw], axis=1) - true
-    share = float(overlapped(view, after, pose(), at, CAMERA, max_range=RANGE))
+    share = float(overlapped(view, after, pose(), MountedCamera(CAMERA, at, IMAGE), RANGE))
     sd = np.array([NOISE.forward, NOISE.left, NOISE.yaw]) * np.sqrt(SHARE / share)
     np.testing.assert_allclose(error.std(0), sd, rtol=0.06)  # five standard errors of 4,000 draws
     assert np.all(np.abs(error.mean(0)) < 5 * sd / np.sqrt(4000))

@@ -8,20 +8,21 @@ import pytest
 
 from jaxbiped.geometry.rays import INSIDE, marked, nearness
 from jaxbiped.sensing import PRESETS, measure_raycast
-from jaxbiped.sensing.camera import T_robot_camera, mount, placed
+from jaxbiped.sensing.camera import MountedCamera, T_robot_camera, mount, placed
 from jaxbiped.sensing.raycast import cast, margin
 from tests.reference import sensing as reference
 from tests.sensing.scenes import CAMERA, IMAGE, as_jax, as_numpy, make, pose, random_scene, stack
 
 STRETCHED = PRESETS["rendered"].stereo.model_copy(update={"stretch_kept": 0.1, "stretch_lost": 0.6})
 SCENES = [random_scene(seed) for seed in range(16)]
+EYE = MountedCamera(CAMERA, mount(CAMERA), IMAGE)
 
 
 @jax.jit
 @jax.vmap
 def cast_all(arena, where, roll, pitch):
     marks = arena.boxes.contrast >= 0.5
-    return cast(arena, where, CAMERA, mount(CAMERA), IMAGE, roll, pitch, marks, arena.floor_contrast >= 0.5)
+    return cast(arena, where, EYE, (roll, pitch), marks, arena.floor_contrast >= 0.5)
 
 
 @jax.jit

@@ -31,6 +31,6 @@ def engine(config, on_progress=None, *, points, done, begun=None, pause=0.0):
 if __name__ == "__main__":
     from functools import partial
 
-    from jaxbiped.study.run_study import conduct
+    from jaxbiped.study.run_study import Engine, compute_study
 
-    conduct(Path(sys.argv[1]), CONFIG, engine=partial(engine, begun=sys.argv[2], pause=0.15))
+    compute_study(Path(sys.argv[1]), CONFIG, engine=Engine(partial(engine, begun=sys.argv[2], pause=0.15)))

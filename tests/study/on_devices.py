@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from jaxbiped import planning
-from jaxbiped.study.run_study import conduct
+from jaxbiped.study.run_study import Engine, compute_study
 from jaxbiped.study.sweep import SweepConfig
 
 AXIS = {"field": "costs.c3", "values": (5.0, 20.0)}
@@ -43,7 +43,9 @@ if __name__ == "__main__":
         np.savez(Path(folder) / f"{count}.npz", *jax.tree.leaves(fields(everything[:count])))
         study = config(sensor)
         told = []
-        conduct(Path(folder) / str(count), study, points=tuple(study.points()), on_progress=told.append)
+        compute_study(
+            Path(folder) / str(count), study, points=tuple(study.points()), engine=Engine(on_progress=told.append)
+        )
         rows = pl.read_parquet(Path(folder) / str(count) / "rows" / "*.parquet")
         assert (told[-1].ended, told[-1].total) == (rows.height, rows.height)
         assert told[-1].reached == rows["success"].sum()

@@ -74,7 +74,7 @@ def test_arenas_do_not_depend_on_the_other_kinds():
 
 def test_each_kind_has_a_program_of_its_own():
     groups = group_points(only_point(StudyConfig()), ("full", "floor_only"), kinds_of(FAMILIES))
-    assert [group.static.spec.size_x for group in groups] == [1.8, 3.0]
+    assert [group.spec.grid.size_x for group in groups] == [1.8, 3.0]
     with pytest.raises(jb.InputError, match="does not support terrain"):
         terrain = kinds_of((scene_family(CONFIGS / "terrain" / "stairs.toml"),))
         config = StudyConfig(mission={"executor": "native"})

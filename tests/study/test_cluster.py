@@ -21,7 +21,7 @@ from jaxbiped.devices import cores
 from jaxbiped.errors import InputError
 from jaxbiped.study import cluster, shard_files, store
 from jaxbiped.study.cluster import Cluster, connect, local_cluster
-from jaxbiped.study.run_study import conduct
+from jaxbiped.study.run_study import Engine, compute_study
 from tests.study import pretend
 from tests.study.engine import CONFIG, TABLE, engine
 
@@ -79,7 +79,7 @@ def scheduler():
 def whole(tmp_path_factory):
     """The same study in this process."""
     folder = tmp_path_factory.mktemp("whole") / "r"
-    conduct(folder, CONFIG, engine=engine)
+    compute_study(folder, CONFIG, engine=Engine(engine))
     return folder
 
 
@@ -133,8 +133,8 @@ def test_killed_worker(scheduler, whole, begun, tmp_path):
                         os.kill(victim, signal.SIGKILL)
                         lost.extend(n for n, pid, _ in marks(begun) if pid == victim and n not in handed_out)
 
-            manifest = conduct(
-                tmp_path / "r", CONFIG, engine=killing, device=on_cluster.device, on_progress=told.append
+            manifest = compute_study(
+                tmp_path / "r", CONFIG, engine=Engine(killing, on_cluster.device, on_progress=told.append)
             )
             assert on_cluster.workers() == 1
     finally:
@@ -154,11 +154,11 @@ def test_local_workers_go_on_with_it_and_back(whole, begun, tmp_path):
     """Begun here, gone on with on a cluster of processes, ended here; by N workers that share the cores."""
     folder = tmp_path / "r"
     with pytest.raises(KeyboardInterrupt):
-        conduct(folder, CONFIG, engine=stopping(engine, 3))
+        compute_study(folder, CONFIG, engine=Engine(stopping(engine, 3)))
     with local_cluster(2) as client:
         on_cluster = Cluster(client, compute=partial(pretend.compute, begun=begun, slow=(3,)))
         with pytest.raises(KeyboardInterrupt):
-            conduct(folder, CONFIG, resume=True, engine=stopping(on_cluster, 4), device=on_cluster.device)
+            compute_study(folder, CONFIG, resume=True, engine=Engine(stopping(on_cluster, 4), on_cluster.device))
         told = []
         assert len(list(on_cluster(CONFIG, told.append, done=set(range(10)) - {3, 5}))) == 2
         assert [progress.ended for progress in told] == [8, 8 + 2, 8 + 8]  # shard 3 said that it had two missions done
@@ -169,7 +169,7 @@ def test_local_workers_go_on_with_it_and_back(whole, begun, tmp_path):
     assert stored.state == "stopped" and 3 not in {
         shard_files.shard_number(path) for path in shard_files.shard_paths(folder)
     }
-    conduct(folder, CONFIG, resume=True, engine=engine)
+    compute_study(folder, CONFIG, resume=True, engine=Engine(engine))
     assert_same_study(folder, whole)
     assert {threads for _, _, threads in marks(begun)} == {max(1, cores() // 2)}
 
@@ -178,7 +178,7 @@ def test_shard_that_kills_its_workers(begun, tmp_path):
     deadly = partial(pretend.compute, begun=begun, deadly=(1,))
     died = pytest.raises(InputError, match=r"shard 1: its workers died.*a smaller --shard needs less")
     with dask.config.set({"distributed.scheduler.allowed-failures": 0}), local_cluster(1) as client, died:
-        conduct(tmp_path / "r", CONFIG, engine=Cluster(client, compute=deadly))
+        compute_study(tmp_path / "r", CONFIG, engine=Engine(Cluster(client, compute=deadly)))
     assert store.read(tmp_path / "r")[1].state == "stopped" and len(shard_files.shard_paths(tmp_path / "r")) == 1
 
 
@@ -202,13 +202,13 @@ def test_scheduler_and_workers_that_vanish(monkeypatch, begun, tmp_path):
                 return engine
 
             with pytest.raises(InputError, match=rf"scheduler: has had no worker for 2 s.*dask worker {address}"):
-                conduct(tmp_path / "r", CONFIG, engine=then(lambda: end(worker)))
+                compute_study(tmp_path / "r", CONFIG, engine=Engine(then(lambda: end(worker))))
             with pytest.raises(InputError, match="has had no worker"):
                 Cluster(client)
             worker = start_worker(address)
             client.wait_for_workers(1, timeout=60)
             with pytest.raises(InputError, match=r"scheduler: is gone; .* --resume continues the study"):
-                conduct(tmp_path / "r", CONFIG, resume=True, engine=then(lambda: end(running)))
+                compute_study(tmp_path / "r", CONFIG, resume=True, engine=Engine(then(lambda: end(running))))
     finally:
         end(worker, running)
     manifest = store.read_manifest(tmp_path / "r")
@@ -235,7 +235,7 @@ def test_worker_of_another_version(scheduler, begun, tmp_path):
             workers.append(start_worker(scheduler, **other))
             client.wait_for_workers(2, timeout=60)
             with pytest.raises(InputError, match=refused):
-                conduct(tmp_path / "r", CONFIG, engine=on_cluster)
+                compute_study(tmp_path / "r", CONFIG, engine=Engine(on_cluster))
             with pytest.raises(InputError, match=refused):
                 Cluster(client)
             with pytest.raises(InputError, match=r"is the address of a Dask worker, not of its scheduler"):

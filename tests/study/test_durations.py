@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxbiped.mission.library import load_library
+from jaxbiped.executors.motion_library import load_library
 from jaxbiped.motion.config import DurationConfig
 from jaxbiped.study.durations import fit, table_2
 

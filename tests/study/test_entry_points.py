@@ -35,8 +35,8 @@ study = jb.Study(jb.RandomArenas(families=["bump", "lab-corridor"], count=2), ["
                  sensor="lab-fog", executor="lab-slip", metrics=["spl", "lab_turns"])
 groups = groups_of(study.config(), None)
 names = [name for group in groups for name in group.strategies]
-print(names, [type(group.settings.planner).__name__ for group in groups])
-print(groups[0].metrics, *(type(part).__name__ for part in (groups[1].settings.sensor, groups[1].settings.executor)))
+print(names, [type(group.params.planner).__name__ for group in groups])
+print(groups[0].metrics, *(type(part).__name__ for part in (groups[1].params.sensor, groups[1].params.executor)))
 print([getattr(family, "name", family) for family in groups[0].kind.families])
 try:
     jb.Study(jb.RandomArenas(count=2), ["nobody"]).config()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensor_rig import StereoRig
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.study import fitting
 from jaxbiped.study.fitting import choices, fewest_rays

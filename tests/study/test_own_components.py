@@ -23,7 +23,7 @@ from jaxbiped.study.batching import families_of, group_points, only_point, shard
 from jaxbiped.study.config import StudyConfig
 from jaxbiped.study.manifest import Manifest
 from jaxbiped.study.replay import play_again
-from jaxbiped.study.run_study import conduct, in_order, shard_rows
+from jaxbiped.study.run_study import Engine, compute_study, in_order, shard_rows
 from jaxbiped.study.runner import numbered
 from jaxbiped.study.store import read_points
 from tests.study.synthetic import rows
@@ -46,11 +46,11 @@ def test_a_study_of_two_groups_is_cut_block_by_block_by_its_writer_and_its_engin
             frame = rows(10, strategies=("full",)).filter(arena_in(shard))
             yield shard, frame.with_columns(strategy=literal(groups[shard.group].strategies[0]))
 
-    conduct(tmp_path / "study", two_groups, engine=engine)
+    compute_study(tmp_path / "study", two_groups, engine=Engine(engine))
     assert seen["points"] is None and len(read_points(tmp_path / "study")) == 1
     assert shard_rows(two_groups, only_point(two_groups)) == [6, 6, 4, 4]
-    conduct_again = conduct(tmp_path / "other", two_groups, engine=engine, enough=both_strategies)
-    assert conduct_again.rows == 12  # one block, with both
+    again = compute_study(tmp_path / "other", two_groups, engine=Engine(engine), enough=both_strategies)
+    assert again.rows == 12  # one block, with both
 
 
 def arena_in(shard):
@@ -184,7 +184,7 @@ def test_numbers_of_components_are_those_of_missions_played_again():
         fear: float = 3.0
 
     strategy = Strategy("shy", Shy())
-    settings = jb.MissionConfig().settings(strategy)
-    assert float(numbered(settings, strategy, {"planner.fear": 5.0}).planner.fear) == 5.0
-    same = numbered(settings, strategy, {"sensor.reach": 1.0})
-    assert float(same.planner.fear) == 3.0 and same.sensor == settings.sensor
+    params = jb.MissionConfig().params(strategy)
+    assert float(numbered(params, strategy, {"planner.fear": 5.0}).planner.fear) == 5.0
+    same = numbered(params, strategy, {"sensor.reach": 1.0})
+    assert float(same.planner.fear) == 3.0 and same.sensor == params.sensor

@@ -52,9 +52,9 @@ def test_the_mission_of_a_sweep_point(tmp_path):
 
 @pytest.mark.slow
 def test_missions_are_played_as_they_were(tmp_path):
-    from jaxbiped.study.run_study import conduct
+    from jaxbiped.study.run_study import compute_study
 
-    conduct(tmp_path / "r", StudyConfig(arenas=12, strategies=PAIR))
+    compute_study(tmp_path / "r", StudyConfig(arenas=12, strategies=PAIR))
     kept = open_stored(tmp_path / "r")
     for name in PAIR:
         for arena, mission in zip((3, 7), play_again(kept.manifest, 0, {}, name, (3, 7)), strict=True):

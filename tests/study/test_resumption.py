@@ -15,14 +15,14 @@ import pytest
 from jaxbiped import files
 from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.errors import InputError
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.study import shard_files, store
 from jaxbiped.study.lock import FolderLock
 from jaxbiped.study.resumption import refuse_taken
-from jaxbiped.study.run_study import conduct
+from jaxbiped.study.run_study import Engine, compute_study
 from tests.study.engine import CONFIG, TABLE, engine
 
-conduct_here = partial(conduct, config=CONFIG, engine=engine)
+conduct_here = partial(compute_study, config=CONFIG, engine=engine)
 
 
 def listing(folder):
@@ -40,7 +40,7 @@ def stopped(tmp_path):
             yield shard
 
     with pytest.raises(KeyboardInterrupt):
-        conduct(tmp_path / "r", CONFIG, engine=breaking)
+        compute_study(tmp_path / "r", CONFIG, engine=Engine(breaking))
     return tmp_path / "r"
 
 

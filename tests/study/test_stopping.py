@@ -12,7 +12,7 @@ from jaxbiped.statistics.sequential import Goal
 from jaxbiped.study import store
 from jaxbiped.study.batching import shards
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.run_study import conduct
+from jaxbiped.study.run_study import Engine, compute_study
 from jaxbiped.study.stopping import STOPPING, Rule, read_stopping
 from tests.study.synthetic import rows
 
@@ -32,7 +32,7 @@ def engine(config, on_progress=None, *, points, done, last=99):
 
 def watched(folder, width, **how):
     rule = Rule(Goal("success", *PAIR, width), folder, CONFIG.arenas)
-    return rule, conduct(folder, CONFIG, enough=rule, **({"engine": engine} | how))
+    return rule, compute_study(folder, CONFIG, enough=rule, **({"engine": Engine(engine)} | how))
 
 
 def test_it_ends_at_the_first_look_that_is_tight_enough(tmp_path):
@@ -63,7 +63,7 @@ def test_it_ends_with_the_arenas_where_the_width_is_never_reached(tmp_path):
 def test_a_stopped_one_goes_on_to_the_same_end(tmp_path):
     whole, _ = watched(tmp_path / "whole", 0.25)
     with pytest.raises(KeyboardInterrupt):
-        watched(tmp_path / "r", 0.25, engine=partial(engine, last=1))
+        watched(tmp_path / "r", 0.25, engine=Engine(partial(engine, last=1)))
     assert not (tmp_path / "r" / STOPPING).exists() and stopping_sentences(tmp_path / "r") == ()
     rule, _ = watched(tmp_path / "r", 0.25, resume=True)
     assert rule.outcome() == whole.outcome()
@@ -72,7 +72,7 @@ def test_a_stopped_one_goes_on_to_the_same_end(tmp_path):
 
 def test_stored_shards_can_be_enough(tmp_path):
     with pytest.raises(KeyboardInterrupt):
-        watched(tmp_path / "r", 0.01, engine=partial(engine, last=7))
+        watched(tmp_path / "r", 0.01, engine=Engine(partial(engine, last=7)))
     rule, manifest = watched(tmp_path / "r", 0.25, resume=True)
     assert rule.looks < 8 and manifest.rows == 8 * 80  # what was computed is kept
 

@@ -27,7 +27,9 @@ class Config(Model):
 
 
 def create(folder, **changes):
-    return store.create(folder, Config(), **{"seed": 3, "arenas": 20, "command": "jaxbiped compare", **changes})
+    return store.create(
+        folder, store.StudyHeader(Config(), **{"seed": 3, "arenas": 20, "command": "jaxbiped compare", **changes})
+    )
 
 
 def listing(folder):

@@ -6,7 +6,7 @@ import pytest
 from jaxbiped.config import Model
 from jaxbiped.errors import InputError
 from jaxbiped.statistics import compare
-from jaxbiped.study import create
+from jaxbiped.study import StudyHeader, create
 from jaxbiped.study.stored_series import choose, compare_sides, open_stored, side_by_side
 from tests.study.synthetic import rows
 
@@ -32,9 +32,8 @@ def stored(folder, *, seed=0, arenas=60, points=1, strategies=("full", "bump_awa
         schema={"point": pl.Int32, "mission.costs.c3": pl.Float64, "pitch": pl.Float64},
     )
     kind = {"points": table} if points > 1 else {}
-    with create(
-        folder, Config(), seed=seed, arenas=arenas, command=f"jaxbiped compare --seed {seed}", **kind
-    ) as results:
+    header = StudyHeader(Config(), seed=seed, arenas=arenas, command=f"jaxbiped compare --seed {seed}", **kind)
+    with create(folder, header) as results:
         results.append(frame)
         results.finish(compile_time=1.0)
     return folder

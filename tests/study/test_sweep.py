@@ -10,7 +10,7 @@ from scipy.stats import qmc
 from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.config import parse
 from jaxbiped.errors import InputError
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.study import memory_limit
 from jaxbiped.study.batching import group_points, shards
 from jaxbiped.study.memory_limit import check_memory
@@ -86,12 +86,12 @@ def test_points_that_differ_in_traced_numbers_share_a_group():
     )
     groups = group_points(config.points(), STRATEGIES)
     assert [group.points for group in groups] == [tuple(range(8)), tuple(range(8, 16))]
-    assert [group.static.spec.pitch for group in groups] == [0.1, 0.05]
+    assert [group.spec.grid.pitch for group in groups] == [0.1, 0.05]
     one = groups[0]
-    assert one.settings.costs.c1.shape == (16,) and one.populations.bump_width.tolist() == pytest.approx([0.2, 0.3])
+    assert one.params.costs.c1.shape == (16,) and one.populations.bump_width.tolist() == pytest.approx([0.2, 0.3])
     assert one.population_of.tolist() == [0, 0, 0, 0, 1, 1, 1, 1] * 2
-    np.testing.assert_allclose(one.settings.body.radius[:4], [0.09, 0.09, 0.12, 0.12])
-    assert one.settings.strategy.bumps.tolist() == [True, False] * 8
+    np.testing.assert_allclose(one.params.body.radius[:4], [0.09, 0.09, 0.12, 0.12])
+    assert one.params.strategy.bumps.tolist() == [True, False] * 8
     rays = sweep({"field": "camera.columns", "values": [64, 32]})
     assert len(group_points(rays.points(), STRATEGIES)) == 2
     # How simulated bipeds walk is no number of the program, and does not matter to others.
@@ -206,23 +206,23 @@ def test_more_points_than_memory_holds_are_refused(monkeypatch):
     long = {"range": {"start": 1, "stop": 2, "num": 1000}}
     with pytest.raises(InputError, match=r"axes: 1000 x 1000 x 1000 points do not fit in memory; at most [0-9]+ fit"):
         sweep(*({"field": f"costs.c{k}"} | long for k in range(1, 4)))
-    static = group_points(sweep(C3).points(), STRATEGIES)[0].static
-    check_memory(static, 64, 2, 1024, 2)
+    spec = group_points(sweep(C3).points(), STRATEGIES)[0].spec
+    check_memory(spec, 64, 2, 1024, 2)
     monkeypatch.setattr(memory_limit, "memory", lambda: 2**31)
     with pytest.raises(InputError, match=r"shard: 64 points x 2 strategies: at most (\d+) arenas a shard fit") as stop:
-        check_memory(static, 64, 2, 65536, 2)
+        check_memory(spec, 64, 2, 65536, 2)
     fit = int(str(stop.value).split("at most ")[1].split()[0])
-    check_memory(static, 64, 2, fit, 2)
+    check_memory(spec, 64, 2, fit, 2)
     monkeypatch.setattr(memory_limit, "memory", lambda: 2**26)
     with pytest.raises(InputError, match=r"need [0-9.]+ GiB, of 0.1 available; sweep fewer points"):
-        check_memory(static, 2000, 2, 1024, 2)
+        check_memory(spec, 2000, 2, 1024, 2)
 
 
 @pytest.mark.parametrize("workers", [1, 2, 3, 64])
 @pytest.mark.parametrize(("points", "strategies"), [(1, 1), (1, 5), (3, 3), (8, 1), (33, 2), (129, 4)])
 def test_what_memory_holds_is_counted_as_programs_are_compiled(points, strategies, workers, monkeypatch):
     """Queues, and the points of a program, are of powers of two."""
-    static = group_points(sweep(C3).points(), STRATEGIES)[0].static
+    spec = group_points(sweep(C3).points(), STRATEGIES)[0].spec
 
     def needed(arenas):
         length, rows = 64, 8
@@ -230,12 +230,12 @@ def test_what_memory_holds_is_counted_as_programs_are_compiled(points, strategie
             length *= 2
         while rows < points * strategies:
             rows *= 2
-        lasting = memory_limit.map_bytes(static, workers) + points * memory_limit.POINT + rows * memory_limit.SETTING
+        lasting = memory_limit.map_bytes(spec, workers) + points * memory_limit.POINT + rows * memory_limit.SETTING
         return lasting + length * workers * memory_limit.ROW
 
     for arenas in (1, 7, 64, 1000, 1024, 1025):
         monkeypatch.setattr(memory_limit, "memory", lambda: needed(arenas))  # noqa: B023
-        check_memory(static, points, strategies, arenas, workers)
+        check_memory(spec, points, strategies, arenas, workers)
         monkeypatch.setattr(memory_limit, "memory", lambda: needed(arenas) - 1)  # noqa: B023
         with pytest.raises(InputError, match=r"arenas a shard fit in memory|available"):
-            check_memory(static, points, strategies, arenas, workers)
+            check_memory(spec, points, strategies, arenas, workers)

@@ -7,10 +7,10 @@ import polars as pl
 import pydantic
 import pytest
 
+from jaxbiped.executors.world_state import Planned
 from jaxbiped.mission.batched_driver import Result, tally
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.state import Planned
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.study.search import sobol
 from jaxbiped.study.trials import objective
 from jaxbiped.study.tuning import FIRST_TRAINING, TuneConfig, tune

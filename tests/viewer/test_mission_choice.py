@@ -5,9 +5,9 @@ import pytest
 
 from jaxbiped.errors import InputError
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.recorded_driver import Mission
 from jaxbiped.mission.recording import save_log
-from jaxbiped.mission.settings import MissionConfig
 from jaxbiped.viewer import mission_choice as room
 from jaxbiped.viewer.mission_choice import Files, Study, choices, missions
 from jaxbiped.viewer.server import serving

@@ -13,7 +13,7 @@ from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.mission.log import Walk
-from jaxbiped.mission.settings import MissionConfig
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.snapshots import outlines
 from jaxbiped.report.pictures import COLOURS
 from jaxbiped.viewer import layers, triangles

@@ -1,33 +1,24 @@
-"""Executors play a command in the true world; also the referee's rules for a nominal one.
-
-`kinematic` moves exactly as the primitives say; `sampled` moves as simulated bipeds were measured to; simulated bipeds
-are driven from the host. Users may add more (`execution.Executor`).
-"""
+"""The executor that moves exactly as the primitives say, and the referee's rules for it: `kinematic`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import jax
 import jax.numpy as jnp
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height, rises_near
-from jaxbiped.core.registry import EXECUTORS
+from jaxbiped.executors.execution import CHECKS, ODOMETRY, TOUCH, Execution
+from jaxbiped.executors.params import ExecutorParams
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world, wrap_angle
 from jaxbiped.jax_settings import with_own_settings
-from jaxbiped.mission.execution import CHECKS, ODOMETRY, TOUCH, Execution, Executor
-from jaxbiped.mission.sampled_executor import sampled
-from jaxbiped.mission.settings import MissionParams
-from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command, duration
 from jaxbiped.sensing.counter_rng import fold
 from jaxbiped.sensing.odometry import drift
 
 
 @with_own_settings
-def kinematic(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
+def kinematic(arena: Arena, world: WorldState, command: Command, params: ExecutorParams) -> Execution:
     """Nominal displacement and time (Table 2); odometry drifts with the distance walked.
 
     Referee, from the true arena: the robot collides if a box between its foot, raised by a step, and its head, or
@@ -36,7 +27,7 @@ def kinematic(arena: Arena, world: WorldState, command: Command, settings: Missi
     the height that the primitive steps to: a straight step over an edge, or a step up without a bump. Edges may be
     displaced by `edge_tolerance`, and heights may differ by `height_tolerance`.
     """
-    limits = settings.limits
+    limits = params.limits
     cos, sin = jnp.cos(command.turn), jnp.sin(command.turn)
     dx, dy = command.length * cos - command.left * sin, command.length * sin + command.left * cos
     x, y = to_world(world.pose, dx, dy)
@@ -49,55 +40,26 @@ def kinematic(arena: Arena, world: WorldState, command: Command, settings: Missi
     z = grounds[nearest]
     fell = error[nearest] > limits.height_tolerance
 
-    head = jnp.where(command.squat, settings.body.squatting, settings.body.standing)
+    head = jnp.where(command.squat, params.body.squatting, params.body.standing)
     collided = jnp.zeros((), bool)
     for part in CHECKS:
         px, py = world.pose.x + part * (x - world.pose.x), world.pose.y + part * (y - world.pose.y)
         foot = jnp.maximum(world.pose.z, expected)
-        between = (arena.boxes.top > foot + settings.body.step + TOUCH) & (arena.boxes.bottom < foot + head - TOUCH)
+        between = (arena.boxes.top > foot + params.body.step + TOUCH) & (arena.boxes.bottom < foot + head - TOUCH)
         hit = arena.boxes.used & between & (plan_distance(arena.boxes, px, py) < limits.body_radius)
         collided = collided | jnp.any(hit)
-        collided = collided | rises_near(arena.terrain, px, py, limits.body_radius, foot + settings.body.step + TOUCH)
+        collided = collided | rises_near(arena.terrain, px, py, limits.body_radius, foot + params.body.step + TOUCH)
     outside = (x < 0) | (x > arena.size_xy[0]) | (y < 0) | (y > arena.size_xy[1])
 
     seed = fold(world.seed, ODOMETRY, world.decisions)
-    moved, variances = drift((dx, dy, command.turn), settings.odometry, seed)
+    moved, variances = drift((dx, dy, command.turn), params.odometry, seed)
     return Execution(
         pose=Pose(x, y, z, yaw),
         moved=jnp.stack(moved),
         variances=variances,
-        time=duration(command, settings.durations),
+        time=duration(command, params.durations),
         distance=jnp.abs(command.length) + jnp.abs(command.left),
         collided=collided,
         fell=fell & ~collided,
         outside=outside,
     )
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Kinematic(Executor):
-    """Moves exactly as the primitives say; see `kinematic`."""
-
-    on_terrain = True
-
-    def execute(self, arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
-        """See `Executor`."""
-        return kinematic(arena, world, command, settings)
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Sampled(Executor):
-    """Moves as simulated bipeds were measured to; see `sampled`."""
-
-    places_feet, on_terrain = True, True
-
-    def execute(self, arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
-        """See `Executor`."""
-        return sampled(arena, world, command, settings)
-
-
-BUILT_IN = {"kinematic": Kinematic(), "sampled": Sampled()}
-for _name, _executor in BUILT_IN.items():
-    EXECUTORS.add(_name, _executor)

@@ -16,7 +16,7 @@ from jaxbiped.config import Model, load
 
 Count = Annotated[int, pydantic.Field(ge=0)]
 Three = tuple[float, float, float]
-DEFAULT = Path(__file__).with_name("library.toml")
+DEFAULT = Path(__file__).with_name("motion_library.toml")
 """The library of the default robot, as `jaxbiped primitives` wrote it."""
 PLAYED = ("straight", "turn", "step_up", "step_down", "squat_straight", "sidestep")
 """The primitives that displace the robot, in the order of the arrays of `Library`."""

@@ -20,7 +20,6 @@ from jaxbiped.biped import request as ask
 from jaxbiped.biped.config import RobotModelConfig
 from jaxbiped.biped.gait import generate
 from jaxbiped.biped.request import Request
-from jaxbiped.mission.config import WalkConfig as WalkConfig
 from jaxbiped.motion.primitives import Primitive
 
 Pace = Literal["fast", "paper"]

@@ -8,12 +8,12 @@ from jaxtyping import Array, Bool, Float, Int, UInt32
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height
+from jaxbiped.executors.contact_rules import body_touches, edges, feet_touch, off_ground
+from jaxbiped.executors.execution import ODOMETRY, PLAY, Execution
+from jaxbiped.executors.motion_library import PLAYED, Library
+from jaxbiped.executors.params import ExecutorParams
+from jaxbiped.executors.world_state import WorldState
 from jaxbiped.geometry.pose import Pose, to_robot, to_world, wrap_angle
-from jaxbiped.mission.contact_rules import body_touches, edges, feet_touch, off_ground
-from jaxbiped.mission.execution import ODOMETRY, PLAY, Execution
-from jaxbiped.mission.library import PLAYED, Library
-from jaxbiped.mission.settings import MissionParams
-from jaxbiped.mission.state import WorldState
 from jaxbiped.motion.primitives import Command, Primitive, duration
 from jaxbiped.sensing import counter_rng
 from jaxbiped.sensing.counter_rng import fold
@@ -23,8 +23,8 @@ STRAIGHT, TURN, UP, DOWN, SQUAT, SIDE = range(len(PLAYED))
 WAY = (1 / 3, 2 / 3, 1.0)  # fractions of its path at which the body is checked against boxes
 
 
-def sampled(arena: Arena, world: WorldState, command: Command, settings: MissionParams) -> Execution:
-    """Displacements, falls and stops as measured in simulation (`settings.library`); time is Table 2's.
+def sampled(arena: Arena, world: WorldState, command: Command, params: ExecutorParams) -> Execution:
+    """Displacements, falls and stops as measured in simulation (`params.library`); time is Table 2's.
 
     Turn, sideways step and primitive are drawn one after another. Each ends where requested, plus the mean error of the
     trials on the mild set and a normal error with their covariance, and falls as often as there. A step over an edge
@@ -37,7 +37,7 @@ def sampled(arena: Arena, world: WorldState, command: Command, settings: Mission
     Odometry counts the true displacement with the drift of every executor. Consumes the channels PLAY and ODOMETRY of
     the mission's seed.
     """
-    library, limits = settings.library, settings.limits
+    library, limits = params.library, params.limits
     length, _, offset = library.feet
     seed = fold(world.seed, PLAY, world.decisions)
     walks = (command.primitive == Primitive.STRAIGHT_FORWARD) | (command.primitive == Primitive.PASS_GATE)
@@ -68,7 +68,7 @@ def sampled(arena: Arena, world: WorldState, command: Command, settings: Mission
 
     moves = (turned != 0).any() | (aside != 0).any() | (ahead != 0).any()
     sway = jnp.where(moves, library.sway[kind], 0.0)
-    head = jnp.where(command.squat, settings.body.squatting, settings.body.standing)
+    head = jnp.where(command.squat, params.body.squatting, params.body.standing)
     highest = jnp.maximum(world.pose.z, after.z)
     poses = [Pose(at.x, at.y, highest, wrap_angle(world.pose.yaw + part * command.turn)) for part in (0.5, 1.0)]
     for part in WAY:
@@ -77,17 +77,17 @@ def sampled(arena: Arena, world: WorldState, command: Command, settings: Mission
     collided = jnp.zeros((), bool)
     for pose in poses:
         collided = collided | body_touches(arena, pose, head, sway)
-        collided = collided | feet_touch(arena, pose, library.feet, highest + settings.body.step)
+        collided = collided | feet_touch(arena, pose, library.feet, highest + params.body.step)
 
     dx, dy = to_robot(world.pose, after.x, after.y)
     true = (dx, dy, wrap_angle(after.yaw - world.pose.yaw))
-    moved, variances = drift(true, settings.odometry, fold(world.seed, ODOMETRY, world.decisions))
+    moved, variances = drift(true, params.odometry, fold(world.seed, ODOMETRY, world.decisions))
     width, depth = arena.size_xy[0], arena.size_xy[1]
     return Execution(
         pose=after,
         moved=jnp.stack(moved),
         variances=variances,
-        time=duration(command, settings.durations),
+        time=duration(command, params.durations),
         distance=jnp.hypot(dx, dy),
         collided=collided,
         fell=(fell_turning | fell_aside | fell_ahead | trips | slides) & ~collided,

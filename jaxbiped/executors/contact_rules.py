@@ -9,9 +9,9 @@ from jaxtyping import Array, Bool, Float
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.ground import ground_height, rises_near
+from jaxbiped.executors.execution import TOUCH
 from jaxbiped.geometry.boxes import plan_distance
 from jaxbiped.geometry.pose import Pose, to_world
-from jaxbiped.mission.execution import TOUCH
 
 NEAREST, FURTHEST, SPACING = -0.02, 0.20, 0.0025  # [m] ahead of the midpoint of the feet, where edges are searched
 NONE = 1.0  # [m] if no edge is found
@@ -48,7 +48,7 @@ def off_ground(
     """Whether the ground under the feet is so much higher or lower than `pose.z` that the robot falls.
 
     Args:
-      rims: `mission.library.Rims`: how near to the middle of a sole a rise, or a drop, may begin.
+      rims: `motion_library.Rims`: how near to the middle of a sole a rise, or a drop, may begin.
       tolerance: [m] tolerated difference in height.
     """
     up_ahead, up_aside, down_ahead, down_aside = rims

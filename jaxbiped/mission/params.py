@@ -9,11 +9,13 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
 
 from jaxbiped.config import Model
 from jaxbiped.core.component import traced_component as traced_component
 from jaxbiped.errors import InputError
+from jaxbiped.executors.execution import find_executor
+from jaxbiped.executors.motion_library import Library, load_library
+from jaxbiped.executors.params import Limits as Limits
 from jaxbiped.geometry.height_field import HeightField, height_range
 from jaxbiped.mapping import Body, GridSpec, MapParams
 from jaxbiped.mission.config import BELOW_POINTS as BELOW_POINTS
@@ -25,8 +27,6 @@ from jaxbiped.mission.config import VISUAL as VISUAL
 from jaxbiped.mission.config import CostConfig as CostConfig
 from jaxbiped.mission.config import LimitConfig as LimitConfig
 from jaxbiped.mission.config import MissionConfig as MissionConfig
-from jaxbiped.mission.execution import find_executor
-from jaxbiped.mission.library import Library, load_library
 from jaxbiped.mission.metric import Metric
 from jaxbiped.mission.sensors import find_sensor
 from jaxbiped.mission.strategies import Strategy, StrategyFlags, find_strategy
@@ -39,21 +39,6 @@ from jaxbiped.sensing.landmarks import LandmarkNoise
 from jaxbiped.sensing.motion import VisualNoise
 from jaxbiped.sensing.noise import StereoNoise
 from jaxbiped.sensing.odometry import OdometryNoise
-
-
-@jax.tree_util.register_dataclass
-@dataclass(frozen=True)
-class Limits:
-    """`LimitConfig`, traced, and the radius of the colliding body."""
-
-    goal_radius: Float[Array, "*B"]  # [m]
-    max_decisions: Int[Array, "*B"]
-    max_looks: Int[Array, "*B"]
-    edge_tolerance: Float[Array, "*B"]  # [m]
-    height_tolerance: Float[Array, "*B"]  # [m]
-    body_radius: Float[Array, "*B"]  # [m]
-    rise: Float[Array, "*B"]  # [m] height of a step up or down: one level
-    start_variance: Float[Array, "*B 3"]  # [m2, m2, rad2]
 
 
 @jax.tree_util.register_dataclass
@@ -84,7 +69,7 @@ class MissionParams:
 class MissionSpec:
     """What determines array shapes and code paths: one mission program is compiled for each of these. Hashable."""
 
-    spec: GridSpec
+    grid: GridSpec
     image: ImageSpec
     sensor: str
     executor: str
@@ -93,8 +78,15 @@ class MissionSpec:
     fading: bool = False  # whether the map forgets what has moved
     knows_pose: bool = False  # whether the robot does, and its points have no attitude error to remove
 
+    @property
+    def spec(self) -> GridSpec:
+        """`grid` by its former name, which sensors may read."""
+        return self.grid
 
-def program(config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None) -> MissionSpec:
+
+def mission_spec(
+    config: MissionConfig, size_xy: tuple[float, float], terrain: HeightField | None = None
+) -> MissionSpec:
     """The static part of a config for arenas of one size [m] with such terrain, whose heights are concrete.
 
     Raises:
@@ -124,7 +116,7 @@ def program(config: MissionConfig, size_xy: tuple[float, float], terrain: Height
 PLANNERS = {"cell": GridPlanner(), "heading": HeadingPlanner()}  # for strategies without their own
 
 
-def settings_of(config: MissionConfig, strategy: str | Strategy) -> MissionParams:
+def mission_params(config: MissionConfig, strategy: str | Strategy) -> MissionParams:
     """The traced form of a config, for one strategy, given as object or by name."""
     limits = config.limits
     sd, sd_yaw = limits.start_sd

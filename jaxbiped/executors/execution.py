@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from jaxbiped.core.component import as_component
+from jaxbiped.core.names import SIMULATED
 from jaxbiped.core.registry import EXECUTORS
 from jaxbiped.errors import InputError
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.config import SIMULATED
 from jaxbiped.motion.config import STEP_TOLERANCE
 
 CHECKS = (1 / 3, 2 / 3, 1.0)  # fractions of its path at which the body is checked against boxes
@@ -44,7 +44,7 @@ class Executor:
     places_feet: ClassVar[bool] = False  # default for placing feet by measured edges
     on_terrain: ClassVar[bool] = False  # whether it supports arenas with terrain
 
-    def execute(self, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
+    def execute(self, arena: Any, world: Any, command: Any, params: Any) -> Execution:
         """Execute one `Command` in an `Arena`, starting from `WorldState`.
 
         Noise is a function of `world.seed` and `world.decisions` alone (`core` `fold`): the same for every batch.
@@ -58,7 +58,7 @@ def find_executor(name: str) -> Executor | None:
     Raises:
       InputError: an unknown name, with the known ones; a module that cannot be imported.
     """
-    from jaxbiped.mission import executors  # noqa: F401  registers those that are built in
+    from jaxbiped.executors import built_in  # noqa: F401  registers those that are built in
 
     return (
         None
@@ -71,13 +71,13 @@ WANTED = {"moved": ((3,), "f"), "variances": ((3,), "f"), "time": ((), "f"), "di
 WANTED |= {name: ((), "b") for name in ("collided", "fell", "outside")}
 
 
-def execution_of(executor: Executor, arena: Any, world: Any, command: Any, settings: Any) -> Execution:
+def execution_of(executor: Executor, arena: Any, world: Any, command: Any, params: Any) -> Execution:
     """Run an executor's command and check the result. An invalid distance or time becomes a pose that is not finite.
 
     Raises:
       InputError: a result that is not the execution of one robot.
     """
-    made = executor.execute(arena, world, command, settings)
+    made = executor.execute(arena, world, command, params)
     where = f"executor {type(executor).__name__}"
     if not isinstance(made, Execution):
         raise InputError("its execute must return an Execution", field=where, value=type(made).__name__)
@@ -89,7 +89,7 @@ def execution_of(executor: Executor, arena: Any, world: Any, command: Any, setti
             wanted = f"{'truth values' if kind == 'b' else 'real numbers'} of shape {list(shape)}"
             message = f"gave {jnp.result_type(value)}{list(found[0])} where {wanted} are required"
             raise InputError(message, field=f"{where}: {name}")
-    from jaxbiped.mission.executors import Kinematic, Sampled
+    from jaxbiped.executors.built_in import Kinematic, Sampled
 
     if type(executor) in (Kinematic, Sampled):
         return made

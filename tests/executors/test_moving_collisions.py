@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from jaxbiped.arenas.moving_boxes import Movers
+from jaxbiped.executors.execution import Execution
+from jaxbiped.executors.moving_collisions import CHECKS, met
+from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.geometry.pose import Pose
-from jaxbiped.mission.execution import Execution
-from jaxbiped.mission.moving_collisions import CHECKS, met
 from jaxbiped.mission.outcome import Code
-from jaxbiped.mission.settings import MissionConfig
-from jaxbiped.mission.state import Planned, WorldState
+from jaxbiped.mission.params import MissionConfig
 from jaxbiped.motion.primitives import Command
 from tests.sensing.scenes import SLOTS, make
 
-SETTINGS = MissionConfig().settings("full")
-RADIUS, MEASURE = float(SETTINGS.limits.body_radius), float(SETTINGS.durations.measure)
+PARAMS = MissionConfig().params("full")
+RADIUS, MEASURE = float(PARAMS.limits.body_radius), float(PARAMS.durations.measure)
 MET = jax.jit(met)
 HALF = 0.05  # [m] of the box
 
@@ -41,7 +41,7 @@ def situation(way, speed, walk, time=0.0, top=0.5, bottom=0.0, duration=16.0, sq
     )
     command = Command(turn=zero, primitive=whole, length=zero, rise=whole, squat=jnp.array(squat), left=zero)
     executed = Execution(after, jnp.zeros(3), jnp.zeros(3), jnp.float32(duration), zero, no, no, no)
-    return arena, world, command, executed, SETTINGS
+    return arena, world, command, executed, PARAMS
 
 
 def nearest(way, speed, walk, time=0.0, duration=16.0, steps=20_000):

@@ -8,7 +8,8 @@ import pytest
 from jaxbiped.biped import request as ask
 from jaxbiped.biped.gait import home_table
 from jaxbiped.errors import InputError
-from jaxbiped.mission.primitive_schedule import ANGLE, PER_METRE, Move, WalkConfig, requests, targets
+from jaxbiped.executors.config import WalkConfig
+from jaxbiped.executors.primitive_schedule import ANGLE, PER_METRE, Move, requests, targets
 from jaxbiped.motion.primitives import Primitive
 
 ROBOT = WalkConfig().biped

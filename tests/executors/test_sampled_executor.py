@@ -10,23 +10,25 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from jaxbiped.arenas.scene import load_scene
+from jaxbiped.executors.kinematic_executor import kinematic
+from jaxbiped.executors.motion_library import PLAYED, load_library
+from jaxbiped.executors.sampled_executor import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.executors import kinematic
-from jaxbiped.mission.library import PLAYED, load_library
 from jaxbiped.mission.outcome import Code
+from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import run_logged
-from jaxbiped.mission.sampled_executor import DOWN, SIDE, STRAIGHT, TURN, UP, draw, sampled, stand_probability
-from jaxbiped.mission.settings import MissionConfig, program
+from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command, Primitive
 from jaxbiped.sensing.config import OdometryConfig
 from jaxbiped.study.queues import run_all
+from jaxbiped.study.workload import Workload
 from tests.mission.test_failures import scene
 
 CONFIG = MissionConfig(executor="sampled")
-SETTINGS = CONFIG.settings("full")
+PARAMS = CONFIG.params("full")
 SURE = CONFIG.model_copy(update={"odometry": OdometryConfig(forward=0, lateral=0, yaw_walked=0, yaw_turned=0)})
-LIBRARY, ENTRIES = SETTINGS.library, load_library().primitives
+LIBRARY, ENTRIES = PARAMS.library, load_library().primitives
 SEEDS = 16
 MANY = 4000  # draws: means within 4 standard errors, variances within 10 %
 FOOT, HIP = 0.10, 0.045  # [m] length of a foot, and its middle to the side
@@ -44,16 +46,16 @@ def command(primitive=Primitive.STRAIGHT_FORWARD, length=0.0, turn=0.0, rise=0, 
 
 
 @jax.jit
-def played(arena, what, settings, height):
-    world, _ = start(arena, settings, jnp.uint32(0), program(CONFIG, (1.8, 1.4)).spec)
+def played(arena, what, params, height):
+    world, _ = start(MissionSetup(arena, params, mission_spec(CONFIG, (1.8, 1.4))), jnp.uint32(0))
     world = replace(world, pose=replace(world.pose, z=height))
-    one = lambda seed: sampled(arena, replace(world, seed=seed), what, settings)  # noqa: E731
+    one = lambda seed: sampled(arena, replace(world, seed=seed), what, params)  # noqa: E731
     return jax.vmap(one)(seeds(SEEDS))
 
 
-def play(arena, what, settings=SETTINGS, height=0.0):
+def play(arena, what, params=PARAMS, height=0.0):
     """One command from the arena's start, under each of SEEDS seeds."""
-    return played(jax.tree.map(jnp.asarray, arena), what, settings, jnp.float32(height))
+    return played(jax.tree.map(jnp.asarray, arena), what, params, jnp.float32(height))
 
 
 def seeds(count):
@@ -106,12 +108,12 @@ def test_nothing_asked_is_nothing_done():
 def test_turn_side_and_way_follow_each_other():
     """With the errors taken out, it goes where `kinematic` goes, and takes as long."""
     exact = replace(LIBRARY, bias=0 * LIBRARY.bias, root=0 * LIBRARY.root)
-    settings = replace(SURE.settings("full"), library=exact)
+    params = replace(SURE.params("full"), library=exact)
     what = command(length=0.05, turn=0.7, left=-0.02)
-    done = play(scene(), what, settings)
+    done = play(scene(), what, params)
     arena = jax.tree.map(jnp.asarray, scene())
-    world, _ = start(arena, settings, jnp.uint32(0), program(CONFIG, (1.8, 1.4)).spec)
-    nominal = kinematic(arena, world, what, settings)
+    world, _ = start(MissionSetup(arena, params, mission_spec(CONFIG, (1.8, 1.4))), jnp.uint32(0))
+    nominal = kinematic(arena, world, what, params)
     for name in ("x", "y", "yaw"):
         assert getattr(done.pose, name)[0] == pytest.approx(float(getattr(nominal.pose, name)), abs=1e-6)
     assert done.time[0] == nominal.time
@@ -120,7 +122,7 @@ def test_turn_side_and_way_follow_each_other():
 
 
 def test_its_odometry_counts_what_it_did():
-    done = play(scene(), command(length=0.05), SURE.settings("full"))
+    done = play(scene(), command(length=0.05), SURE.params("full"))
     x, y = done.pose.x - 0.4, done.pose.y - 0.7
     np.testing.assert_allclose(done.moved, np.stack([x, y, done.pose.yaw], axis=1), atol=1e-6)
     assert np.std(done.moved[:, 0]) > 1e-4
@@ -198,7 +200,7 @@ def test_boxes_are_met(box, length, squat, collides):
 def test_a_library_is_swept_without_compiling_anew():
     play(scene(), command(length=0.05))
     before = played._cache_size()
-    worse = replace(SETTINGS, library=replace(LIBRARY, bias=LIBRARY.bias - 0.01))
+    worse = replace(PARAMS, library=replace(LIBRARY, bias=LIBRARY.bias - 0.01))
     assert np.mean(play(scene(), command(length=0.05), worse).pose.x) < 0.445
     assert played._cache_size() == before
 
@@ -207,8 +209,8 @@ def test_a_library_is_swept_without_compiling_anew():
 @pytest.mark.parametrize("number", range(1, 7))
 def test_the_papers_scenes_are_solved(number):
     _, arena = load_scene(f"configs/scenes/experiment_{number}.toml")
-    static = program(CONFIG, tuple(round(float(v), 6) for v in arena.size_xy))
-    assert run_logged(arena, SETTINGS, jnp.uint32(1), static).code == Code.REACHED
+    spec = mission_spec(CONFIG, tuple(round(float(v), 6) for v in arena.size_xy))
+    assert run_logged(MissionSetup(arena, PARAMS, spec), jnp.uint32(1)).code == Code.REACHED
 
 
 @pytest.mark.slow
@@ -216,7 +218,8 @@ def test_the_papers_scenes_are_solved(number):
 def test_scenes_with_bumps_are_solved_whatever_the_seed(number):
     """Points in the air past the edges of bumps made 45 of 768 such missions fail; simulated falls are rarer by far."""
     _, arena = load_scene(f"configs/scenes/experiment_{number}.toml")
-    static = program(CONFIG, tuple(round(float(v), 6) for v in arena.size_xy))
-    arenas, settings = stack([jax.device_get(arena)] * 256), stack([SETTINGS])
-    ended = run_all(*jax.tree.map(jnp.asarray, (arenas, seeds(256), settings)), 256, static, lambda _: None, slots=64)
+    spec = mission_spec(CONFIG, tuple(round(float(v), 6) for v in arena.size_xy))
+    arenas, params = stack([jax.device_get(arena)] * 256), stack([PARAMS])
+    arenas, params = jax.tree.map(jnp.asarray, (arenas, params))
+    ended = run_all(Workload(arenas, seeds(256), params, 256, spec), lambda _: None, slots=64)
     assert np.sum(np.asarray(ended.code) != Code.REACHED) <= 4  # at most 0 were seen; chance, at 2 of 768, gives 0.7
