@@ -159,7 +159,7 @@ def test_the_next_process_compiles_no_kernel_and_no_program():
     first, second = (
         subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines() for _ in range(2)
     )
-    assert second[-1] == "compiled 0 of 6 and 0" and " of 6 and " in first[-1] and first[:-1] == second[:-1]
+    assert second[-1] == "compiled 0 of 7 and 0" and " of 7 and " in first[-1] and first[:-1] == second[:-1]
 
 
 CHANGED = """
