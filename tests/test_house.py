@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = "jaxbiped"
 ROOMS = (
     *("core", "geometry", "formats", "arenas", "sensing", "stereo", "mapping", "localisation", "planning", "motion"),
-    *("physics", "biped", "executors", "mission", "statistics", "study", "report", "reproduction", "viewer"),
+    *("physics", "biped", "executors", "mission", "fitting", "statistics", "study", "report", "reproduction", "viewer"),
     *("api", "commands", "cli"),
 )
 FRONT = "api"  # the room of `import jaxbiped`, whose names are the public ones

@@ -14,11 +14,11 @@ from jaxbiped.arenas.arena import CIRCLE
 from jaxbiped.commands.options.fit_sensor import FitSensorArgs
 from jaxbiped.config import config_hash
 from jaxbiped.files import refuse_existing, write_whole
+from jaxbiped.fitting.ray_sensor_fit import ALIKE, Fit, choices, fit, sensor_toml
+from jaxbiped.fitting.sensor_agreement import Place, agreement, fused, looking, mission, same, score, with_rays, worlds
 from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensor_rig import StereoRig
 from jaxbiped.sensing.config import CameraConfig, NoiseConfig
-from jaxbiped.study.fitting import ALIKE, Fit, choices, fit, sensor_toml
-from jaxbiped.study.sensors import Place, agreement, fused, looking, mission, same, score, with_rays, worlds
 
 
 def main(args: FitSensorArgs) -> int:

@@ -11,12 +11,12 @@ import numpy as np
 import polars as pl
 from jaxtyping import Int
 
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.params import MissionConfig
 from jaxbiped.motion.grid_units import CELL
 from jaxbiped.reproduction.paper import TABLE_2
 from jaxbiped.statistics.comparison import ALL, Comparison, PairComparison, compare
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluation import draw
 
 CROSSES, GOES_ROUND = "full", "floor_only"
 FAMILY = "bump"

@@ -10,18 +10,15 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import polars as pl
-from jaxtyping import Array, Int, PRNGKeyArray, UInt32
 
 from jaxbiped.arenas.arena import Arena
-from jaxbiped.arenas.population import Population
-from jaxbiped.arenas.source import OwnFamily, draw_arena, name_of
-from jaxbiped.core.ready_programs import ready_jit
+from jaxbiped.arenas.source import name_of
 from jaxbiped.core.sizes import ARENAS, POINTS, fill_up, filled
 from jaxbiped.devices import by_rows, cores, mesh_of
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import OnProgress, Tally
 from jaxbiped.mission.oracle import OraclePlan, oracle_plan
-from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.batching import Group, Point, Shard, groups_of, shards
 from jaxbiped.study.config import StudyConfig
@@ -29,8 +26,6 @@ from jaxbiped.study.metric_values import check_metrics, metric_columns
 from jaxbiped.study.rows import frame
 from jaxbiped.study.runner import batch_driver
 from jaxbiped.study.workload import Workload
-
-NOISE = 1  # fold_in of an arena's key, for the noise of its missions
 
 
 @dataclass(frozen=True)
@@ -103,35 +98,6 @@ def compute(
     families = [kind.families[turn] for turn in kind.turns(index[:count])]
     rows = frame(index[:count], batch, group, list(map(name_of, families)), result, plan)
     return rows.with_columns(**metric_columns(batch, group, result, plan, size))
-
-
-@with_own_settings
-@ready_jit(static_argnames=("families",))
-def draw(
-    key: PRNGKeyArray,
-    index: Int[Array, "A"],
-    families: tuple[str | OwnFamily, ...],
-    populations: Population | None = None,
-    turns: Int[Array, "A"] | None = None,
-) -> tuple[Arena, UInt32[Array, "A"]]:
-    """Arenas `index` of the population, and the seeds of their missions' noise: the same for all strategies.
-
-    Args:
-      populations: leaves [U]; the result then holds the arenas of each population in turn: [U * A].
-      turns: index of the family of each arena; by default its number modulo their number.
-    """
-
-    def one(population: Population | None) -> Arena:
-        if turns is None:
-            return jax.vmap(lambda k: draw_arena(key, k, families, population))(index)
-        return jax.vmap(lambda k, turn: draw_arena(key, k, families, population, turn))(index, turns)
-
-    if populations is None:
-        batch = one(None)
-    else:
-        batch = jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:]), jax.vmap(one)(populations))
-    seeds = jax.vmap(lambda k: from_key(jax.random.fold_in(jax.random.fold_in(key, k), NOISE)))(index)
-    return batch, seeds
 
 
 @with_own_settings

@@ -19,6 +19,7 @@ from jaxbiped.core.registry import EXECUTORS as EXECUTORS_OWN
 from jaxbiped.core.registry import FAMILIES
 from jaxbiped.core.registry import SENSORS as SENSORS_OWN
 from jaxbiped.errors import InputError
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.config import EXECUTORS, SENSORS
 from jaxbiped.mission.params import MissionConfig
@@ -30,7 +31,6 @@ from jaxbiped.statistics.schema import STRATEGIES as BUILT_IN
 from jaxbiped.study.arena_kinds import kinds_of
 from jaxbiped.study.components import EXECUTOR, FAMILY, SENSOR, hash_of
 from jaxbiped.study.config import OF_COMPONENTS
-from jaxbiped.study.evaluation import draw
 from jaxbiped.study.manifest import MANIFEST, Manifest
 from jaxbiped.study.runner import check_mission, numbered, play_one, seeing
 from jaxbiped.study.sweep import point_at

@@ -16,12 +16,12 @@ from jaxtyping import Float, Int
 from jaxbiped.arenas.families import SIZE_X, SIZE_Y
 from jaxbiped.devices import cores
 from jaxbiped.jax_settings import with_own_settings
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import Jobs, OnProgress, Result, Tally, Work, compile_queue, no_results, tally
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.planning import Costs
-from jaxbiped.study.evaluation import draw
 
 VECTORS, BLOCK = 8, 16  # capacity of one queue in cost vectors and arenas
 SLOTS = 16  # missions at once: in a queue not much longer than its slots, most of them would idle at its end

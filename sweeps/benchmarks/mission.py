@@ -36,6 +36,7 @@ from jaxbiped.core.names import STRATEGIES
 from jaxbiped.devices import cores
 from jaxbiped.executors.kinematic_executor import kinematic
 from jaxbiped.mission import decision
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import SLOTS, stack
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.mission_step import apply_outcome, sense, step
@@ -45,7 +46,7 @@ from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.study.clock import CompileClock
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluation import draw, evaluate
+from jaxbiped.study.evaluation import evaluate
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.workload import Workload
 from tests.reference import mission as reference

@@ -190,8 +190,38 @@ def singles(size, repeats):
         seen = np.isfinite(exact) & (exact > 0)
         error = np.max(np.abs(found[seen] - exact[seen]) / exact[seen])
         assert np.array_equal(np.isfinite(exact), np.isfinite(found)), make.__name__
-        print(f"  {make.__name__:11s} {best[0] * 1e3:7.1f} ms, scipy {best[1] * 1e3:7.1f} ms", end="")
+        cell = 1e9 * best[0] / np.isfinite(exact).sum()
+        print(
+            f"  {make.__name__:11s} {best[0] * 1e3:7.1f} ms, {cell:3.0f} ns a cell, scipy {best[1] * 1e3:7.1f} ms",
+            end="",
+        )
         print(f", ratio {best[1] / best[0]:5.2f}, relative error {error:.0e}, first call {first:.1f} s")
+
+
+def queries(size, count, repeats):
+    """Paths on one map, one after the other: the first between opposite corners, the others between random cells."""
+    import pyastar2d
+
+    print(f"paths on one map of {size} x {size}, the map read once")
+    for make in (open_map, rooms, maze, loopy_maze, noise):
+        rng = np.random.default_rng(1)
+        classes = make(rng, size)
+        levels, free = (classes == Cell.BUMP).astype(np.int8), np.argwhere(classes != Cell.OBSTACLE)
+        ends = np.concatenate([free[[0, -1]][None], free[rng.integers(len(free), size=(count, 2))]])
+        first, _ = timed(lambda: planning.PathSearch(classes, levels).path(*ends[1]))  # noqa: B023
+        read = min(timed(planning.PathSearch, classes, levels)[0] for _ in range(repeats))
+        search, best = planning.PathSearch(classes, levels), np.full((2, len(ends)), np.inf)
+        for _ in range(repeats):
+            for q, (start, goal) in enumerate(ends):
+                best[0, q] = min(best[0, q], timed(search.path, start, goal)[0])
+                peer = timed(pyastar2d.astar_path, WEIGHTS[classes], tuple(start), tuple(goal), True)
+                best[1, q] = min(best[1, q], peer[0])
+        (corners, corners_peer), (ours, theirs) = best[:, 0] * 1e3, best[:, 1:].mean(1) * 1e3
+        print(
+            f"  {make.__name__:11s} corners {corners:6.2f} ms, ratio to pyastar2d {corners_peer / corners:5.1f}", end=""
+        )
+        print(f"; {count} others {ours:6.2f} ms each, ratio {theirs / ours:5.1f}", end="")
+        print(f"; reading the map {read * 1e3:4.1f} ms, first call {first:.1f} s")
 
 
 def plan_again(planner: HostPlanner, turns: int, problem: Problem) -> jax.Array:
@@ -241,11 +271,15 @@ def main():
             batches(pool, cores, 28, 36, 1024, 256, 3)
             batches(pool, cores, 140, 180, 64, 16, 2)
             singles(256, 3)
+            queries(256, 8, 2)
             host_planners()
         else:
             batches(pool, cores, 28, 36, 4096, 2048, 8)
             batches(pool, cores, 140, 180, 512, 128, 5)
+            batches(pool, cores, 140, 180, 64, 64, 5)
+            singles(256, 8)
             singles(512, 8)
+            queries(512, 24, 3)
             host_planners()
 
 

@@ -23,17 +23,8 @@ import jax.numpy as jnp
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
-from jaxbiped.geometry.pose import wrap_angle
-from jaxbiped.localisation.kalman_filter import Belief, correct
-from jaxbiped.mapping import Cell
-from jaxbiped.mission.params import MissionConfig, mission_spec
-from jaxbiped.mission.sensor_rig import StereoRig
-from jaxbiped.sensing.config import CameraConfig
-from jaxbiped.sensing.presets import RayConfig
-from jaxbiped.stereo import landmarks, matching
-from jaxbiped.stereo.fit import quality, together
-from jaxbiped.study.fitting import choices, eye, least_contrast, unmarked, watch_from
-from jaxbiped.study.sensors import (
+from jaxbiped.fitting.ray_sensor_fit import choices, eye, least_contrast, unmarked, watch_from
+from jaxbiped.fitting.sensor_agreement import (
     AREA,
     Outcome,
     agreement,
@@ -48,6 +39,15 @@ from jaxbiped.study.sensors import (
     with_rays,
     worlds,
 )
+from jaxbiped.geometry.pose import wrap_angle
+from jaxbiped.localisation.kalman_filter import Belief, correct
+from jaxbiped.mapping import Cell
+from jaxbiped.mission.params import MissionConfig, mission_spec
+from jaxbiped.mission.sensor_rig import StereoRig
+from jaxbiped.sensing.config import CameraConfig
+from jaxbiped.sensing.presets import RayConfig
+from jaxbiped.stereo import landmarks, matching
+from jaxbiped.stereo.fit import quality, together
 
 PRESET = Path(__file__).parents[2] / "configs" / "sensors" / "stereo.toml"
 SEED, FIRST = 7, 1000  # of arenas that are in no fit

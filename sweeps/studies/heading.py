@@ -32,6 +32,7 @@ from jaxbiped import planning
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import truth_grid
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.plan_rollout import follow
@@ -43,7 +44,6 @@ from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
 from jaxbiped.statistics.intervals import mean_and_median, proportion
 from jaxbiped.study.config import StrategyName
 from jaxbiped.study.durations import fit
-from jaxbiped.study.evaluation import draw
 from sweeps.benchmarks.planning import random_maps
 
 TOGETHER = 128  # arenas

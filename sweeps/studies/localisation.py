@@ -26,6 +26,7 @@ from rich.table import Table
 
 from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import Result, stack
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import SIMULATED, MissionConfig, mission_spec
@@ -33,7 +34,6 @@ from jaxbiped.mission.sensor_rig import RENDERED
 from jaxbiped.sensing import VisualConfig
 from jaxbiped.sensing.counter_rng import from_key
 from jaxbiped.statistics.paired import success_difference
-from jaxbiped.study.evaluation import draw
 from jaxbiped.study.hosted import open_rig, run_on_host
 from jaxbiped.study.queues import run_all
 from jaxbiped.study.walks import walk_all

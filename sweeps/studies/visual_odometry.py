@@ -20,6 +20,7 @@ import tyro
 from rich.console import Console
 from rich.table import Table
 
+from jaxbiped.fitting.sensor_agreement import Place, worlds
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.params import MissionConfig
 from jaxbiped.sensing.camera import MountedCamera, mount, placed
@@ -31,7 +32,6 @@ from jaxbiped.sensing.view import View
 from jaxbiped.stereo.matching import grey
 from jaxbiped.stereo.measure import StereoSensor
 from jaxbiped.stereo.tracking import find_features, find_motion
-from jaxbiped.study.sensors import Place, worlds
 
 
 @dataclass(frozen=True)

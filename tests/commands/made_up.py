@@ -12,6 +12,7 @@ from skimage import data
 
 from jaxbiped.commands import compare, fit_sensor, plan, reproduce, run, scenario, sweep
 from jaxbiped.commands.plan import Plan
+from jaxbiped.fitting.ray_sensor_fit import Fit
 from jaxbiped.formats.moving_ai import load_map, load_scenario
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.recorded_driver import Mission
@@ -19,7 +20,6 @@ from jaxbiped.reproduction import EXPERIMENTS
 from jaxbiped.reproduction.findings import Findings
 from jaxbiped.reproduction.mishaps import MISHAPS, Ending
 from jaxbiped.sensing.config import CameraConfig
-from jaxbiped.study.fitting import Fit
 from jaxbiped.study.store import read_manifest
 from tests.commands.test_classify import ROOM
 from tests.commands.test_stereo import CAMERA

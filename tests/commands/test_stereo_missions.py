@@ -7,10 +7,10 @@ from PIL import Image
 
 from jaxbiped import cli
 from jaxbiped.config import load
+from jaxbiped.fitting.ray_sensor_fit import choices
 from jaxbiped.sensing.config import CameraConfig
 from jaxbiped.sensing.presets import SensorConfig
 from jaxbiped.stereo import renderer
-from jaxbiped.study.fitting import choices
 
 SCENE = """
 name = "short"

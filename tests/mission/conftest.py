@@ -12,6 +12,7 @@ import pytest
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.core.names import STRATEGIES
 from jaxbiped.executors.world_state import WorldState
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import Jobs, compile_queue, stack
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig, mission_spec
@@ -20,7 +21,6 @@ from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
 from jaxbiped.motion.primitives import Command
 from jaxbiped.sensing import PRESETS
-from jaxbiped.study.evaluation import draw
 from tests.mission.replay import Moment
 
 ARENAS, POINTS, JOBS, SLOTS = 32, 16, 32, 8

@@ -11,6 +11,7 @@ import pytest
 import tests.mission.strict  # noqa: F401  (the executor)
 from jaxbiped.arenas import load_scene
 from jaxbiped.geometry.pose import Pose
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.config import EXECUTORS
 from jaxbiped.mission.outcome import Code
@@ -18,7 +19,6 @@ from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import turn_once
 from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import start
-from jaxbiped.study.evaluation import draw
 from tests.mission.conftest import CONFIG, SPEC, row
 from tests.mission.strict import Strict, footfall
 

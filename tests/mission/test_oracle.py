@@ -8,13 +8,13 @@ import pytest
 from jaxbiped.arenas.families import FAMILIES, SIZE_X, SIZE_Y
 from jaxbiped.arenas.scene import SceneConfig, to_arena
 from jaxbiped.core.names import STRATEGIES
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.mission.oracle import oracle_plan
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.strategies import find_strategy
 from jaxbiped.planning import Costs, Rules
-from jaxbiped.study.evaluation import draw
 from tests.mission.conftest import CONFIG, SPEC, pad, play, row
 from tests.reference import mapping, motion, planning
 

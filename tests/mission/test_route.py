@@ -15,6 +15,7 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.arenas.families import FAMILIES
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mapping import Cell, truth_grid
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.goal import goal_cell
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig, mission_spec
@@ -25,7 +26,6 @@ from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.motion.local_map import LocalMap
 from jaxbiped.motion.selection import cell_of
 from jaxbiped.planning.planners import GridPlanner, HeadingPlanner
-from jaxbiped.study.evaluation import draw
 from tests.mission.conftest import CONFIG, SPEC
 
 B = 24  # maps

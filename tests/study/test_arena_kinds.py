@@ -10,11 +10,11 @@ import pytest
 import jaxbiped as jb
 from jaxbiped.arenas import families as built_in
 from jaxbiped.arenas.source import Family, scene_family
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.statistics.schema import SCHEMA
 from jaxbiped.study.arena_kinds import ANY, kinds_of
 from jaxbiped.study.batching import group_points, only_point
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluation import draw
 from tests.api.conftest import EXAMPLES
 
 CONFIGS = EXAMPLES.parents[1] / "configs"

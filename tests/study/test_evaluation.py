@@ -11,10 +11,11 @@ import pytest
 from jaxbiped.arenas.config import PopulationConfig
 from jaxbiped.arenas.families import FAMILIES
 from jaxbiped.mission import batched_driver
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.batched_driver import stack
 from jaxbiped.statistics.schema import validate
 from jaxbiped.study.config import StudyConfig
-from jaxbiped.study.evaluation import draw, evaluate
+from jaxbiped.study.evaluation import evaluate
 from jaxbiped.study.sweep import SweepConfig
 
 EVENTS = []

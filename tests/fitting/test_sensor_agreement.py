@@ -2,8 +2,8 @@
 
 import pytest
 
+from jaxbiped.fitting.sensor_agreement import Outcome, same
 from jaxbiped.mission.outcome import Code
-from jaxbiped.study.sensors import Outcome, same
 
 REACHED = Outcome(Code.REACHED, 1.0, 600.0)
 

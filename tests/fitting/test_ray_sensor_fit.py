@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from jaxbiped.fitting import ray_sensor_fit
+from jaxbiped.fitting.ray_sensor_fit import choices, fewest_rays
+from jaxbiped.fitting.sensor_agreement import Place
 from jaxbiped.mission.params import MissionConfig
 from jaxbiped.mission.sensor_rig import StereoRig
 from jaxbiped.sensing.config import CameraConfig
-from jaxbiped.study import fitting
-from jaxbiped.study.fitting import choices, fewest_rays
-from jaxbiped.study.sensors import Place
 
 CAMERA = CameraConfig()
 
@@ -36,8 +36,8 @@ def test_as_few_rays_as_come_close_enough_and_else_the_most(monkeypatch, wrong, 
         count = 0 if config.sensor == "stereo" else differ[config.camera.columns, config.camera.rows]
         return np.where(np.arange(1000).reshape(25, 40) < count, 4, 1).astype(np.int8), None
 
-    monkeypatch.setattr(fitting, "fused", pretend)
-    monkeypatch.setattr(fitting, "looking", lambda config, rig: None)
+    monkeypatch.setattr(ray_sensor_fit, "fused", pretend)
+    monkeypatch.setattr(ray_sensor_fit, "looking", lambda config, rig: None)
     places, rig = [object.__new__(Place)] * 2, object.__new__(StereoRig)  # nobody looks at these
     rays, same = fewest_rays(places, rig, MissionConfig(sensor="stereo"))
     assert (rays.columns, rays.rows) == wanted and same == pytest.approx(1 - differ[wanted] / 1000)

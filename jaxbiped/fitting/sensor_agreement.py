@@ -19,6 +19,7 @@ from jaxbiped.geometry.pose import Pose
 from jaxbiped.jax_settings import with_own_settings
 from jaxbiped.mapping import Cell, GridSpec
 from jaxbiped.mapping.truth import truth_grid
+from jaxbiped.mission.arena_batch import draw
 from jaxbiped.mission.mission_step import sense
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig, MissionParams, MissionSpec, mission_spec
@@ -28,7 +29,6 @@ from jaxbiped.mission.setup import MissionSetup
 from jaxbiped.mission.state import AgentState, start
 from jaxbiped.sensing.presets import RayConfig
 from jaxbiped.sensing.view import View
-from jaxbiped.study.evaluation import draw
 
 AREA = (SIZE_X, SIZE_Y)
 AWAY = (0.25, 0.80)  # [m] in front of the target of a view

@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.config import field_docs
+from jaxbiped.fitting.sensor_agreement import AREA, Place, agreement, fused, looking, setup_in, standing, with_rays
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.params import MissionConfig, MissionParams, mission_spec
 from jaxbiped.mission.sensor_rig import StereoRig, where
@@ -20,7 +21,6 @@ from jaxbiped.sensing.landmarks import sight
 from jaxbiped.sensing.presets import RayConfig, SensorConfig
 from jaxbiped.stereo.fit import Quality, Watched, fit_noise, quality, share, together, watch
 from jaxbiped.stereo.landmark_fit import Sight, fit_landmarks
-from jaxbiped.study.sensors import AREA, Place, agreement, fused, looking, setup_in, standing, with_rays
 
 CONTRASTS = (0.0, 0.0625, 0.125, 0.1875, 0.25, 0.375, 0.5)  # where the lowest one that can be matched is searched
 CONTRAST_PLACES, CONTRAST_VIEWS = 3, 2
