@@ -192,7 +192,8 @@ def test_terrain_alone_and_in_an_arena_are_one(tmp_path):
     arena = arena_of(tmp_path, text=SCENE.replace("boxes = [", "#").replace("    {{", "#").replace("\n]", ""))
     spec = GridSpec(size_x=1.55, size_y=1.15, ground_levels=4)
     body = RobotConfig().body()
-    alone, inside = terrain_grid(arena.terrain, spec, body), truth_grid(arena, spec, body)
+    alone = jax.jit(terrain_grid, static_argnums=1)(arena.terrain, spec, body)
+    inside = jax.jit(truth_grid, static_argnums=1)(arena, spec, body)
     np.testing.assert_array_equal(alone[0], inside[0])
     np.testing.assert_array_equal(alone[1], inside[1])
 
