@@ -22,7 +22,7 @@ from jaxbiped.study.resumption import refuse_taken
 from jaxbiped.study.run_study import Engine, compute_study
 from tests.study.engine import CONFIG, TABLE, engine
 
-conduct_here = partial(compute_study, config=CONFIG, engine=engine)
+compute_here = partial(compute_study, config=CONFIG, engine=Engine(engine))
 
 
 def listing(folder):
@@ -48,7 +48,7 @@ def stopped(tmp_path):
 def whole(tmp_path_factory):
     """The same study, never stopped."""
     folder = tmp_path_factory.mktemp("whole") / "r"
-    conduct_here(folder)
+    compute_here(folder)
     return folder
 
 
@@ -66,7 +66,7 @@ def assert_same_study(folder, whole):
 def test_stopped_study_goes_on(stopped, whole):
     before = store.read_manifest(stopped)
     assert before.state == "stopped" and before.wall_time > 0
-    manifest = conduct_here(stopped, resume=True)
+    manifest = compute_here(stopped, resume=True)
     assert_same_study(stopped, whole)
     assert manifest.resumed == 1 and manifest.wall_time > before.wall_time
 
@@ -86,7 +86,7 @@ def test_killed_study_goes_on(tmp_path, whole, moment):
     done = len(shard_files.shard_paths(folder))
     assert moment <= done <= moment + 1 and store.read_manifest(folder).state == "running"
     assert (folder / ".lock").exists() and store.read(folder)[0].height == 8 * done  # readable as it is
-    conduct_here(folder, resume=True, engine=partial(engine, begun=begun))
+    compute_here(folder, resume=True, engine=Engine(partial(engine, begun=begun)))
     assert_same_study(folder, whole)
     assert len(begun.read_text().split()) <= 10 + 1
 
@@ -95,7 +95,7 @@ def test_killed_while_writing(stopped, whole):
     """What was being written when the power went is swept up."""
     for place in ("rows/.part-00004.parquet.77.part", ".manifest.json.77.part"):
         (stopped / place).write_bytes(b"half")
-    conduct_here(stopped, resume=True)
+    compute_here(stopped, resume=True)
     assert_same_study(stopped, whole)
 
 
@@ -105,12 +105,12 @@ def test_killed_before_its_manifest(tmp_path, whole, left):
     folder.mkdir()
     for name in left:
         (folder / name).mkdir() if name == "rows" else (folder / name).touch()
-    conduct_here(folder, resume=True)
+    compute_here(folder, resume=True)
     assert_same_study(folder, whole)
 
 
 def test_resuming_nothing_begins_it(tmp_path, whole):
-    assert conduct_here(tmp_path / "new" / "r", resume=True).resumed == 0
+    assert compute_here(tmp_path / "new" / "r", resume=True).resumed == 0
     assert_same_study(tmp_path / "new" / "r", whole)
 
 
@@ -118,7 +118,7 @@ def refused(folder, match, config=CONFIG):
     """The study is refused, and nothing in its folder changes."""
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     with pytest.raises(InputError, match=match):
-        conduct_here(folder, config=config, resume=True)
+        compute_here(folder, config=config, resume=True)
     assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
 
 
@@ -129,7 +129,7 @@ def test_another_folder_is_not_taken_up(tmp_path):
 
 def test_without_resume_a_stopped_study_is_refused(stopped):
     with pytest.raises(InputError, match="must be new or empty"):
-        conduct_here(stopped)
+        compute_here(stopped)
 
 
 def test_a_new_study_where_one_was_stopped_is_told_to_resume(stopped, whole, tmp_path):
@@ -172,7 +172,7 @@ def test_other_versions_are_refused(stopped):
 
 def test_more_devices_of_a_kind_are_taken(stopped, whole):
     edit(stopped, device="2 x cpu")
-    conduct_here(stopped, resume=True)
+    compute_here(stopped, resume=True)
     assert_same_study(stopped, whole)
 
 
@@ -188,7 +188,7 @@ def test_damaged_shard_is_named_and_can_be_removed(stopped, whole, damage):
         path.write_bytes({"cut": data[: len(data) // 2], "garbage": b"not parquet" * 9, "empty": b""}[damage])
     refused(stopped, r"part-00002.parquet: .*remove .* to have it computed again")
     path.unlink()
-    conduct_here(stopped, resume=True)
+    compute_here(stopped, resume=True)
     assert_same_study(stopped, whole)
 
 
@@ -202,7 +202,7 @@ def test_two_runs_into_one_folder_are_refused(stopped):
     lock = FolderLock(stopped)
     try:
         with pytest.raises(InputError, match=f"is being written by process {os.getpid()}"):
-            conduct_here(stopped, resume=True)
+            compute_here(stopped, resume=True)
     finally:
         lock.release()
 
@@ -216,9 +216,9 @@ def test_disk_that_fills_up_leaves_what_was_stored(stopped, whole, monkeypatch):
 
     monkeypatch.setattr(files.os, "fsync", fills_up)
     with pytest.raises(InputError, match="no space left"):
-        conduct_here(stopped, resume=True)
+        compute_here(stopped, resume=True)
     frame, manifest = store.read(stopped)
     assert frame.height == 8 * (count + 2) and manifest.state in ("running", "stopped")
     monkeypatch.undo()
-    assert conduct_here(stopped, resume=True).resumed == 2
+    assert compute_here(stopped, resume=True).resumed == 2
     assert_same_study(stopped, whole)
