@@ -125,7 +125,7 @@ def input_error(error: pydantic.ValidationError, *, file: str | Path | None = No
     return InputError(message, file=file, field=field, value=value)
 
 
-def told(message: str) -> NoReturn:
+def refuse_value(message: str) -> NoReturn:
     """Raise an error for a pydantic validator whose message already names the wrong value."""
     raise PydanticCustomError("told", "{message}", {"message": message})
 

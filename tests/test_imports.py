@@ -48,7 +48,7 @@ threads = [threading.Thread(target=lambda: found.append(planning.field)) for _ i
 for thread in threads: thread.start()
 for thread in threads: thread.join()
 assert len(found) == 8 and len(set(map(id, found))) == 1 and found[0].__name__ == "field", found
-import jaxbiped.planning.cost_field, jaxbiped.planning.heap_astar
+import jaxbiped.planning.cost_field, jaxbiped.planning.reference_astar
 from jaxbiped.planning import astar, field
 assert callable(field) and callable(astar) and callable(jaxbiped.planning.field), "not their modules"
 assert "numba" not in sys.modules and "mujoco" not in sys.modules

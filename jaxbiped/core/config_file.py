@@ -8,7 +8,7 @@ from typing import Any
 
 import pydantic
 
-from jaxbiped.config import Model, input_error, load_toml, told
+from jaxbiped.config import Model, input_error, load_toml, refuse_value
 from jaxbiped.errors import InputError
 
 FILE = "file"  # key of a table that names one
@@ -27,7 +27,7 @@ class FileModel(Model):
         try:
             return with_file(cls, data)
         except InputError as error:
-            told(str(error))
+            refuse_value(str(error))
 
 
 def with_file(model: type[Model], data: Any) -> Any:

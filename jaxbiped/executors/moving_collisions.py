@@ -17,7 +17,7 @@ from jaxbiped.motion.primitives import Command
 CHECKS = 64  # moments of a measurement and what follows it: 3 cm of an obstacle's path at 0.02 m/s and 106 s
 
 
-def met(
+def hits_moving_box(
     arena: Arena, world: WorldState, command: Command, executed: Execution, params: ExecutorParams
 ) -> Bool[Array, ""]:
     """Whether a moving box touches one robot while it measures, or while it executes its command.

@@ -78,7 +78,7 @@ def class_by_xla(evidence, surfaces, body, params, spec):
     ground = ground_level(columns, evidence, spec)
     solid = solid_levels(columns, evidence, params, spec)
     relief = read_relief(surfaces, ground, columns, solid, params, spec)
-    return read_cells(solid, ground, relief, body, params.head_margin, spec)
+    return classify_cells(solid, ground, relief, body, params.head_margin, spec)
 
 
 def class_by_kernel(evidence, surfaces, body, params, spec):
@@ -179,7 +179,7 @@ def ground_level(columns: UInt32[Array, "H W"], evidence: Float[Array, "H W Z"],
     return jnp.where(run >> spec.ground_levels == 0, best, 0)
 
 
-def read_cells(
+def classify_cells(
     solid: UInt32[Array, "H W"],
     ground: Int[Array, "H W"],
     relief: Relief,

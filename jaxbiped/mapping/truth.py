@@ -11,7 +11,7 @@ from jaxbiped.arenas.ground import HOLE, ground_height, terrain_height
 from jaxbiped.core.signatures import checked
 from jaxbiped.geometry.boxes import Boxes, covers
 from jaxbiped.geometry.height_field import HeightField, surface_height
-from jaxbiped.mapping.cobstacles import read_cells
+from jaxbiped.mapping.cobstacles import classify_cells
 from jaxbiped.mapping.grid import Body, Cell, GridSpec, check_body
 from jaxbiped.mapping.relief import Relief
 
@@ -46,7 +46,7 @@ def truth_grid(arena: Arena, spec: GridSpec, body: Body) -> tuple[Int[Array, "H 
         solid = solid | levels_up_to(terrain_height(arena.terrain, x, y), spec)
         heights = jnp.where(heights == HOLE, jnp.nan, heights)
     columns, ground, relief, holes = read_places(heights, solid, spec)
-    classes, levels = read_cells(columns, ground, relief, body, 0.0, spec)
+    classes, levels = classify_cells(columns, ground, relief, body, 0.0, spec)
     return jnp.where(holes, jnp.int8(Cell.OBSTACLE), classes), levels
 
 
@@ -75,7 +75,7 @@ def terrain_grid(terrain: HeightField, spec: GridSpec, body: Body) -> tuple[Int[
     columns, ground, relief, holes = jax.tree.map(
         lambda leaf: leaf[:, 0], jax.lax.map(read_row, jnp.arange(height), batch_size=8)
     )
-    classes, levels = read_cells(columns, ground, relief, body, 0.0, spec)
+    classes, levels = classify_cells(columns, ground, relief, body, 0.0, spec)
     return jnp.where(holes, jnp.int8(Cell.UNMEASURED), classes), jnp.where(holes, jnp.int8(0), levels)
 
 

@@ -71,7 +71,9 @@ def look_for(
     return replace(seen, known=seen.known & crossing.edge.known)
 
 
-def walked(agent: AgentState, command: Command, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
+def update_edges(
+    agent: AgentState, command: Command, moved: Float[Array, "3"], variances: Float[Array, "3"]
+) -> AgentState:
     """Update the edges known to the robot after a command, by odometry: an edge ahead may now be behind."""
     ahead, behind = (edges.predict(edge, moved, variances) for edge in (agent.ahead, agent.behind))
     stepped = command.rise != 0

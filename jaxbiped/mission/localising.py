@@ -64,14 +64,14 @@ def choose(good: Bool[Array, ""], new: Belief, old: Belief) -> Belief:
     return jax.tree.map(lambda a, b: jnp.where(good, a, b), new, old)
 
 
-def carried_on(agent: AgentState, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
+def anchor_after_odometry(agent: AgentState, moved: Float[Array, "3"], variances: Float[Array, "3"]) -> AgentState:
     """The agent after a command, by odometry."""
     if agent.anchor is None:
         return agent
     return replace(agent, anchor=replace(agent.anchor, moved=moved, variances=variances))
 
 
-def unmarked(
+def sightings_without_landmarks(
     view: View,
     world: WorldState,
     agent: AgentState,

@@ -12,13 +12,13 @@ from jaxtyping import Array, Int
 from jaxbiped.arenas.arena import Arena
 from jaxbiped.arenas.moving_boxes import at_time, only
 from jaxbiped.executors.execution import Execution, execution_of
-from jaxbiped.executors.moving_collisions import met
+from jaxbiped.executors.moving_collisions import hits_moving_box
 from jaxbiped.executors.world_state import BodyPose, WorldState
 from jaxbiped.geometry.pose import wrap_angle
 from jaxbiped.localisation.kalman_filter import predict
 from jaxbiped.mission.decision import DecisionTrace, climbed, decide
-from jaxbiped.mission.foot_placement import walked
-from jaxbiped.mission.localising import carried_on, unmarked
+from jaxbiped.mission.foot_placement import update_edges
+from jaxbiped.mission.localising import anchor_after_odometry, sightings_without_landmarks
 from jaxbiped.mission.metric import Step, updated
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionParams
@@ -61,7 +61,7 @@ def carry_out(world: WorldState, command: Command, setup: MissionSetup) -> Execu
     if arena.movers is None:
         return play(arena, world, command, params)
     executed = play(jax.vmap(partial(only, moving=False))(arena), world, command, params)
-    run_into = jax.vmap(met)(arena, world, command, executed, params)
+    run_into = jax.vmap(hits_moving_box)(arena, world, command, executed, params)
     return replace(executed, collided=executed.collided | run_into, fell=executed.fell & ~run_into)
 
 
@@ -113,7 +113,7 @@ def sense(
     at = Standpoint(world.pose if spec.knows_pose else pose, agent.look, world.squat, attitude, seed)
     view = view_of(params.sensor, arena, at, params, spec)
     if spec.localisation != "landmarks":
-        return view, unmarked(view, world, agent, setup, seed)
+        return view, sightings_without_landmarks(view, world, agent, setup, seed)
     return view, landmarks.sight(
         arena, pose, params.camera, params.landmarks, spec.image, seed, agent.look, world.squat
     )
@@ -164,5 +164,7 @@ def apply_outcome(
     if params.metrics:
         step = Step(arena, world, after, command, ~stays, params)
         after = replace(after, metrics=updated(params.metrics, world.metrics, step))
-    agent = carried_on(walked(agent, command, executed.moved, executed.variances), executed.moved, executed.variances)
+    agent = anchor_after_odometry(
+        update_edges(agent, command, executed.moved, executed.variances), executed.moved, executed.variances
+    )
     return after, replace(agent, belief=belief, since=params.durations.measure + acted)

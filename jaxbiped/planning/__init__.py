@@ -5,7 +5,7 @@ from jaxbiped.core.lazy_loading import lazy_package
 lazy_package(
     __name__,
     {
-        "heap_astar": "AStarPath astar",
+        "reference_astar": "AStarPath astar",
         "costs": "BASE_PITCH DIRECTIONS Costs Rules edge_costs",
         "cost_field": "CostToGo cost_to_go field",
         "gradient": "MoveCounts move_counts path_cost",

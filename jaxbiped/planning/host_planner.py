@@ -20,7 +20,7 @@ from jaxbiped.core.time_limit import TimeLimit, within
 from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning.costs import Costs
-from jaxbiped.planning.path_check import PathQuery, read_ways
+from jaxbiped.planning.path_check import PathQuery, check_paths
 from jaxbiped.planning.planners import FAILED, FINE, TOO_SLOW, Planner, Problem, Route
 
 MapPlanner = Callable[[np.ndarray, np.ndarray, tuple[int, int], tuple[int, int], Costs], Any]
@@ -150,7 +150,7 @@ def answer(classes, levels, start, goal, costs, rules, active, numbers):
             function, limit, (given[k], raised[k], tuple(starts[k]), tuple(goals[k]), own[rows[k]])
         )
         seconds[k] = time.perf_counter() - begun
-    moves, cost, wrong = read_ways(ways, PathQuery(grids, levels, start, goal, costs, rules[:, 0]), length)
+    moves, cost, wrong = check_paths(ways, PathQuery(grids, levels, start, goal, costs, rules[:, 0]), length)
     for k, message in wrong.items():
         fault[k] = FAILED
         tell(FUNCTIONS[numbers[k]][0], message)

@@ -35,8 +35,8 @@ class PathQuery(NamedTuple):
         return PathQuery(classes, levels, start, goal, Costs(*costs.tolist()), bool(cutting))
 
 
-def read_ways(ways: list[Any], query: PathQuery, length: int) -> tuple[np.ndarray, np.ndarray, dict[int, str]]:
-    """`read_way` of a batch at once, since one by one it takes longer than many a planner.
+def check_paths(ways: list[Any], query: PathQuery, length: int) -> tuple[np.ndarray, np.ndarray, dict[int, str]]:
+    """`check_path` of a batch at once, since one by one it takes longer than many a planner.
 
     Args:
       ways: the returned path of each map; None: there is none.
@@ -101,7 +101,7 @@ def read_ways(ways: list[Any], query: PathQuery, length: int) -> tuple[np.ndarra
     for n in np.flatnonzero(bad).tolist():
         k = maps[n]
         try:
-            read_way(ways[k], query.of(k))
+            check_path(ways[k], query.of(k))
         except ValueError as error:
             wrong[k] = str(error)
     return moves, cost, wrong
@@ -125,7 +125,7 @@ def whole_cells(way) -> np.ndarray:
     return whole
 
 
-def read_way(way, query: PathQuery) -> tuple[np.ndarray, float]:
+def check_path(way, query: PathQuery) -> tuple[np.ndarray, float]:
     """The moves of one path, and its cost by Eq. 1.
 
     Raises:

@@ -17,7 +17,7 @@ from jaxbiped.planning import kernels
 from jaxbiped.planning.arguments import grid_arguments, indices
 from jaxbiped.planning.cost_field import field, valid_tables
 from jaxbiped.planning.costs import DIRECTIONS, STEP, Costs, Rules, edge_costs
-from jaxbiped.planning.kernels import map_moves, map_search
+from jaxbiped.planning.kernels import map_astar, map_moves
 from jaxbiped.planning.path import TIE, read_path
 
 
@@ -58,7 +58,7 @@ class PathSearch:
         self.shape = self.classes.shape
         self._lock, (kinds, prices, cutting) = threading.Lock(), map(np.asarray, valid_tables(given[2:])[0])
         self._prices = np.ascontiguousarray(prices[0], np.float32)
-        self._rooms = [np.empty(size, dtype) for size, dtype in map_search.rooms(*self.shape)]
+        self._rooms = [np.empty(size, dtype) for size, dtype in map_astar.rooms(*self.shape)]
         self._classes = np.ascontiguousarray(self.classes, np.int8)
         levels = np.ascontiguousarray(self.levels, np.int8)
         name, _ = kernels.target("read")
@@ -76,16 +76,16 @@ class PathSearch:
         """
         heading = int(indices("heading", heading))
         answer, cost, expanded, moves = self._search(start_ij, goal_ij, heading)
-        if answer == map_search.ABANDONED:
+        if answer == map_astar.ABANDONED:
             return self._whole(start_ij, goal_ij, heading)
-        if answer == map_search.NONE:
+        if answer == map_astar.NONE:
             return None
         return self._path(np.asarray(start_ij), moves, cost, expanded)
 
     def cost(self, start_ij: Any, goal_ij: Any) -> float:
         """The least cost by Eq. 1, inf without a path; arguments as for `path`."""
-        answer, cost, *_ = self._search(start_ij, goal_ij, map_search.COST_ONLY)
-        if answer == map_search.ABANDONED:
+        answer, cost, *_ = self._search(start_ij, goal_ij, map_astar.COST_ONLY)
+        if answer == map_astar.ABANDONED:
             found = self._whole(start_ij, goal_ij, -1)
             return np.inf if found is None else found.cost
         return cost
@@ -94,9 +94,9 @@ class PathSearch:
         """Answer of the kernel, cost, expanded cells and moves."""
         ends = [self._cell("start_ij", start_ij), self._cell("goal_ij", goal_ij)]
         if not all(((end >= 0) & (end < self.shape)).all() for end in ends):
-            return map_search.NONE, np.inf, 0, np.zeros(0, np.int8)
+            return map_astar.NONE, np.inf, 0, np.zeros(0, np.int8)
         given = np.array([*ends[0], *ends[1], heading], np.int32)
-        wanted = 0 if heading == map_search.COST_ONLY else self.classes.size
+        wanted = 0 if heading == map_astar.COST_ONLY else self.classes.size
         moves, cost, told = np.empty(wanted, np.int8), np.empty(1), np.empty(3, np.int64)
         name, _ = kernels.target("search")
         arguments = self._prices, np.array([1 + TIE], np.float32), given, self._classes

@@ -8,8 +8,9 @@ lazy_package(
         "comparison": "ALL QUESTION Comparison PairComparison StrategySummary Stratum compare default_pairs",
         "equivalence": "Equivalence equivalences",
         "intervals": "Estimate mean_and_median paired_difference proportion",
+        "multiple_testing": "holm",
         "paired": (
-            "PairedMetric equivalent_mean equivalent_success holm improvement mcnemar metric_difference signed_rank "
+            "PairedMetric equivalent_mean equivalent_success improvement mcnemar metric_difference signed_rank "
             "success_difference"
         ),
         "power": "connor_sample_size mcnemar_power sample_size",

@@ -14,7 +14,8 @@ from jaxbiped.errors import InputError
 from jaxbiped.mission.metric import MetricFormat
 from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_and_median, proportion
 from jaxbiped.statistics.metric_differences import corrected_metrics, metric_means, metric_pairs
-from jaxbiped.statistics.paired import PairedMetric, holm, metric_difference, success_difference
+from jaxbiped.statistics.multiple_testing import holm
+from jaxbiped.statistics.paired import PairedMetric, metric_difference, success_difference
 from jaxbiped.statistics.schema import CODES, metric_columns, ordered, ordered_families, validate
 
 OWN = 1  # stream of the seed for bootstraps of a single strategy

@@ -9,7 +9,8 @@ import polars as pl
 from jaxbiped.errors import InputError
 from jaxbiped.statistics.comparison import Stratum, paired, strata
 from jaxbiped.statistics.intervals import Estimate
-from jaxbiped.statistics.paired import equivalent_mean, equivalent_success, holm
+from jaxbiped.statistics.multiple_testing import holm
+from jaxbiped.statistics.paired import equivalent_mean, equivalent_success
 
 MEASURES = ("success", "distance", "time")
 

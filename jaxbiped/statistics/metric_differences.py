@@ -11,7 +11,8 @@ import polars as pl
 from jaxtyping import Float
 
 from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_estimate
-from jaxbiped.statistics.paired import PairedMetric, holm, paired_metric
+from jaxbiped.statistics.multiple_testing import holm
+from jaxbiped.statistics.paired import PairedMetric, paired_metric
 
 SECOND = "#second"  # suffix of the second side's columns; no column name ends like this
 ROUNDING = 1e-6  # relative to the greater number: closer values are ties, since sums of floats depend on their order

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy import stats
-from statsmodels.stats.multitest import multipletests
 from statsmodels.stats.weightstats import DescrStatsW
 
 from jaxbiped.statistics.intervals import NOTHING, Estimate, mean_and_median, paired_difference, score_statistic
@@ -113,13 +111,6 @@ def paired_metric(differences: Float[np.ndarray, "n"], mean: Estimate, median: E
         n=len(differences),
         zeros=int(np.sum(differences == 0)),
     )
-
-
-def holm(p_values: Sequence[float | None]) -> list[float | None]:
-    """Holm's correction (1979) of all p-values of one table; None stays None and is not counted."""
-    there = [p for p in p_values if p is not None]
-    corrected = iter(multipletests(there, method="holm")[1].tolist() if there else [])
-    return [None if p is None else next(corrected) for p in p_values]
 
 
 def equivalent_success(first_only: int, second_only: int, n: int, margin: float, alpha: float = 0.05) -> Estimate:

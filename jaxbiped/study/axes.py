@@ -8,8 +8,7 @@ import numpy as np
 import pydantic
 from jaxtyping import Float
 
-from jaxbiped.config import Model
-from jaxbiped.config import told as told
+from jaxbiped.config import Model, refuse_value
 
 MOST = 1_000_000  # most values of an axis
 
@@ -64,13 +63,17 @@ class Axis(Model):
     def _one_way(self):
         given = [name for name in ("values", "range", "log_range") if getattr(self, name) is not None]
         if len(given) != 1:
-            told(f"{self.field}: give exactly one of values, range and log_range, not {' and '.join(given) or 'none'}")
+            refuse_value(
+                f"{self.field}: give exactly one of values, range and log_range, not {' and '.join(given) or 'none'}"
+            )
         numbers = self.numbers()
         if len(set(numbers)) < len(numbers):
-            told(f"{self.field}: values must be distinct, in {list(numbers)}")
+            refuse_value(f"{self.field}: values must be distinct, in {list(numbers)}")
         for name, others in self.together.items():
             if len(others) != len(numbers):
-                told(f"{self.field}: together.{name} must have {len(numbers)} values, one per value, not {len(others)}")
+                refuse_value(
+                    f"{self.field}: together.{name} must have {len(numbers)} values, one per value, not {len(others)}"
+                )
         return self
 
     def numbers(self) -> tuple[float, ...]:
@@ -99,11 +102,11 @@ class Sobol(Model):
     def _sound(self):
         if self.points & (self.points - 1):
             less = 2 ** (self.points.bit_length() - 1)
-            told(f"points must be a power of 2, such as {less} or {2 * less}, not {self.points}")
+            refuse_value(f"points must be a power of 2, such as {less} or {2 * less}, not {self.points}")
         if not self.names():
-            told("needs a range or a log_range of at least one field")
+            refuse_value("needs a range or a log_range of at least one field")
         for name in set(self.range) & set(self.log_range):
-            told(f"{name}: must be in one of range and log_range")
+            refuse_value(f"{name}: must be in one of range and log_range")
         for log, box in ((False, self.range), (True, self.log_range)):
             for name, bounds in box.items():
                 check_bounds(bounds, f"{name}: the first", "the second", log)
@@ -137,6 +140,6 @@ def plain(numbers: Float[np.ndarray, "n"]) -> tuple[float, ...]:
 def check_bounds(bounds: Bounds, low: str, high: str, log: bool) -> None:
     """Raise about a range that does not increase, or that has no logarithm."""
     if bounds[1] <= bounds[0]:
-        told(f"{low} must be below {high}: {bounds[0]:g} is not below {bounds[1]:g}")
+        refuse_value(f"{low} must be below {high}: {bounds[0]:g} is not below {bounds[1]:g}")
     if log and bounds[0] <= 0:
-        told(f"{low} must be above 0 on a log range, not {bounds[0]:g}")
+        refuse_value(f"{low} must be above 0 on a log range, not {bounds[0]:g}")

@@ -12,11 +12,11 @@ import pydantic
 import tyro
 
 from jaxbiped.arenas.config import FAMILY_OF, PopulationConfig
-from jaxbiped.config import Model
+from jaxbiped.config import Model, refuse_value
 from jaxbiped.core.names import KNOWN
 from jaxbiped.errors import InputError
 from jaxbiped.mission.config import MissionConfig
-from jaxbiped.study.axes import Axis, Sobol, told
+from jaxbiped.study.axes import Axis, Sobol
 from jaxbiped.study.config import OF_COMPONENTS, StudyConfig
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ class SweepConfig(StudyConfig):
             for _ in self.points():
                 pass
         except InputError as error:
-            told(str(error))
+            refuse_value(str(error))
         return self
 
     def fields(self) -> tuple[str, ...]:

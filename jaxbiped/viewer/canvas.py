@@ -116,11 +116,11 @@ class Canvas:
     def moment(self, t: int, on: dict[str, bool]) -> None:
         """Draw the robot's knowledge at moment `t`, for those layers that are on."""
         for name in LAYERS:
-            self.layer(name, t, on[name])
+            self.draw_layer(name, t, on[name])
         if self.mission.log.pictures:
             self.moving["camera"].image = self.mission.log.pictures[t].left
 
-    def layer(self, name: str, t: int, on: bool) -> None:
+    def draw_layer(self, name: str, t: int, on: bool) -> None:
         """Draw one layer as of moment `t`, or hide it."""
         scene, log = self.server.scene, self.mission.log
         if name in HEAVY and not on:

@@ -100,7 +100,7 @@ class Page:
     def switch(self, name: str) -> None:
         """Show or hide a layer, according to its checkbox."""
         with self.lock, self.server.atomic():
-            self.canvas.layer(name, self.moment, self.on()[name])
+            self.canvas.draw_layer(name, self.moment, self.on()[name])
 
     def toggle(self) -> None:
         """Play, or pause; restart when it is over."""

@@ -9,7 +9,7 @@ import pytest
 
 from jaxbiped.arenas.moving_boxes import Movers
 from jaxbiped.executors.execution import Execution
-from jaxbiped.executors.moving_collisions import CHECKS, met
+from jaxbiped.executors.moving_collisions import CHECKS, hits_moving_box
 from jaxbiped.executors.world_state import Planned, WorldState
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.mission.outcome import Code
@@ -19,7 +19,7 @@ from tests.sensing.scenes import SLOTS, make
 
 PARAMS = MissionConfig().params("full")
 RADIUS, MEASURE = float(PARAMS.limits.body_radius), float(PARAMS.durations.measure)
-MET = jax.jit(met)
+MET = jax.jit(hits_moving_box)
 HALF = 0.05  # [m] of the box
 
 
@@ -97,4 +97,4 @@ def test_who_is_met(change, meets):
 
 def test_an_arena_that_stands_meets_nobody():
     arena, *rest = situation(**HEAD_ON)
-    assert not bool(met(replace(arena, movers=None), *rest))
+    assert not bool(hits_moving_box(replace(arena, movers=None), *rest))

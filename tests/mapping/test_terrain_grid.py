@@ -59,7 +59,7 @@ def plain(heights, pitch, spec=SPEC, origin=(0.0, 0.0)):
         top[i, j] = max(tops, default=-np.inf)
         holes[i, j] = len(known) <= SAMPLES**2 / 2
     relief = (own.astype(np.float32), np.zeros_like(own, np.float32), top.astype(np.float32))
-    classes, levels = reference.read_cells(occupied, level, relief, PLAIN_BODY, 0.0, spec)
+    classes, levels = reference.classify_cells(occupied, level, relief, PLAIN_BODY, 0.0, spec)
     return np.where(holes, Cell.UNMEASURED, classes), np.where(holes, 0, levels)
 
 

@@ -11,7 +11,7 @@ from jaxbiped.arenas import load_scene
 from jaxbiped.geometry.pose import Pose
 from jaxbiped.localisation import predict
 from jaxbiped.mission.batched_driver import stack
-from jaxbiped.mission.localising import carried_on, localise, unmarked
+from jaxbiped.mission.localising import anchor_after_odometry, localise, sightings_without_landmarks
 from jaxbiped.mission.outcome import Code
 from jaxbiped.mission.params import MissionConfig, mission_spec
 from jaxbiped.mission.recorded_driver import run_bare
@@ -61,7 +61,7 @@ def told(x=0.048, seen=True) -> Motion:
 def stepped(agent):
     """After one command, by odometry."""
     belief = predict(agent.belief, *MOVED, VARIANCES)
-    return replace(carried_on(agent, MOVED, VARIANCES), belief=belief)
+    return replace(anchor_after_odometry(agent, MOVED, VARIANCES), belief=belief)
 
 
 @pytest.mark.parametrize("seen", [True, False])
@@ -92,7 +92,7 @@ def test_nothing_in_view_leaves_dead_reckoning(arena, way):
 def test_ray_cast_sensor_has_no_landmarks_then(arena):
     for way in WAYS:
         world, agent, setup = begin(arena, way)
-        seen = unmarked(blank_view(setup), world, agent, setup, jnp.uint32(1))
+        seen = sightings_without_landmarks(blank_view(setup), world, agent, setup, jnp.uint32(1))
         assert not np.any(seen.seen)
         assert (seen.motion is None) == (way in ("odometry", "icp"))
         assert seen.motion is None or not seen.motion.seen

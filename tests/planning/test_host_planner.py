@@ -13,7 +13,7 @@ from jaxbiped.errors import InputError
 from jaxbiped.mapping.grid import Cell
 from jaxbiped.planning import DIRECTIONS, Costs, Rules
 from jaxbiped.planning.host_planner import HostPlanner, passable
-from jaxbiped.planning.path_check import PathQuery, read_way, read_ways
+from jaxbiped.planning.path_check import PathQuery, check_path, check_paths
 from tests.reference import planning as reference
 
 ROOT = Path(__file__).parents[2]
@@ -49,11 +49,11 @@ STEEP[:, 2] = 2
 )
 def test_ways_that_are_wrong_are_refused_by_what_is_wrong(way, grid, levels, match):
     with pytest.raises(ValueError, match=match):
-        read_way(way, PathQuery(grid, levels, (0, 0), (0, 3), COSTS, False))
+        check_path(way, PathQuery(grid, levels, (0, 0), (0, 3), COSTS, False))
 
 
 def test_corners_may_be_cut_where_the_rules_allow_it():
-    moves, cost = read_way([[0, 0], [0, 1], [1, 2], [0, 3]], PathQuery(WALL, FLAT, (0, 0), (0, 3), COSTS, True))
+    moves, cost = check_path([[0, 0], [0, 1], [1, 2], [0, 3]], PathQuery(WALL, FLAT, (0, 0), (0, 3), COSTS, True))
     assert moves.tolist() == [0, 1, 7] and cost == pytest.approx(2 + 2 * (np.sqrt(2) + 1))
 
 
@@ -75,7 +75,7 @@ def test_random_walks_cost_what_the_plain_edges_cost_and_are_refused_where_these
                 sum(edges[k, i + 1, j + 1] for k, (i, j) in zip(moves, cells[:-1], strict=True)) if inside else np.inf
             )
             try:
-                given = read_way(cells, PathQuery(grid, levels, cells[0], cells[-1], costs, rules.corner_cutting))
+                given = check_path(cells, PathQuery(grid, levels, cells[0], cells[-1], costs, rules.corner_cutting))
             except ValueError:
                 refused += 1
                 assert price == np.inf
@@ -109,14 +109,14 @@ def test_a_batch_of_ways_is_read_as_one_by_one():
             if rng.random() < 0.1:
                 goal[k] += 1
             ways.append(NASTY[rng.integers(len(NASTY))] if rng.random() < 0.3 else cells.tolist())
-        moves, cost, wrong = read_ways(ways, PathQuery(classes, levels, start, goal, costs, cutting), 3)
+        moves, cost, wrong = check_paths(ways, PathQuery(classes, levels, start, goal, costs, cutting), 3)
         for k, way in enumerate(ways):
             expected, price, complaint = [-1, -1, -1], np.nan, None
             try:
                 if way is not None:
                     own = Costs(*costs[k].tolist())
                     ends = start[k], goal[k]
-                    found, price = read_way(way, PathQuery(classes[k], levels[k], *ends, own, bool(cutting[k])))
+                    found, price = check_path(way, PathQuery(classes[k], levels[k], *ends, own, bool(cutting[k])))
                     expected[: min(3, len(found))] = found[:3]
             except Exception as error:
                 complaint = str(error)
@@ -127,7 +127,7 @@ def test_a_batch_of_ways_is_read_as_one_by_one():
 
 
 def test_no_way_to_go_is_a_way():
-    moves, cost = read_way([[1, 0]], PathQuery(WALL, FLAT, (1, 0), (1, 0), COSTS, False))
+    moves, cost = check_path([[1, 0]], PathQuery(WALL, FLAT, (1, 0), (1, 0), COSTS, False))
     assert len(moves) == 0 and cost == 0
 
 

@@ -10,7 +10,7 @@ from numba import njit
 from jaxbiped import planning
 from jaxbiped.errors import InputError
 from jaxbiped.planning import Costs, PathSearch, Rules, shortest_path
-from jaxbiped.planning.kernels import bucket_queue, map_search
+from jaxbiped.planning.kernels import bucket_queue, map_astar
 from tests.planning import adversarial, oracle
 
 SHAPES = ((1, 9), (9, 1), (5, 7), (12, 9), (28, 36))
@@ -121,7 +121,7 @@ def test_a_pool_that_fills_is_emptied_of_cells_that_were_improved_since():
 def test_what_a_search_abandons_is_read_off_the_field(monkeypatch, how):
     classes = np.ones((20, 30), np.int8)
     if how == "uneven":
-        monkeypatch.setattr(map_search, "ABANDONED", map_search.FOUND)  # whatever the kernel says
+        monkeypatch.setattr(map_astar, "ABANDONED", map_astar.FOUND)  # whatever the kernel says
     costs = Costs(0.0, 0.0, 0.0, 0.0, 0.0) if how == "zero" else Costs()
     search = PathSearch(classes, 0 * classes, costs)
     found = search.path((3, 4), (9, 25))

@@ -123,7 +123,7 @@ def c_obstacles(evidence, surfaces, body, params, spec):
     relief = read_relief(surfaces, ground, occupied, solid, params, spec)
     bears = body.step_tolerance - params.height_margin, body.height_tolerance - params.height_margin
     body = replace(body, step_tolerance=bears[0], height_tolerance=bears[1])
-    return read_cells(solid, ground, relief, body, params.head_margin, spec)
+    return classify_cells(solid, ground, relief, body, params.head_margin, spec)
 
 
 def patch_sum(values, spec):
@@ -214,7 +214,7 @@ def ground_level(occupied, evidence, spec):
     return np.where(occupied.any(-1) & (end <= spec.ground_levels), stands.argmax(-1), 0)
 
 
-def read_cells(occupied, ground, relief, body, head_margin, spec):
+def classify_cells(occupied, ground, relief, body, head_margin, spec):
     near = dilate(occupied, body.radius, spec)
     lower_face = (np.arange(occupied.shape[-1], dtype=np.float32) - np.float32(0.5)) * np.float32(spec.level_height)
     above_step = lower_face >= body.step
@@ -374,4 +374,4 @@ def truth_grid(boxes, spec, body, samples=5, least_share=0.05):
             own[i, j] = all_heights[at == level[i, j]].mean()
         shares = walkable[i, j] / samples**2
         top[i, j] = max((all_heights[at == k].max() for k in np.flatnonzero(shares > least_share)), default=-np.inf)
-    return read_cells(places.mean(2) > least_share, level, (own, np.zeros_like(own), top), body, 0.0, spec)
+    return classify_cells(places.mean(2) > least_share, level, (own, np.zeros_like(own), top), body, 0.0, spec)

@@ -8,7 +8,8 @@ import pytest
 
 from jaxbiped.errors import InputError
 from jaxbiped.statistics.comparison import ALL, compare, default_pairs
-from jaxbiped.statistics.paired import holm, signed_rank, success_difference
+from jaxbiped.statistics.multiple_testing import holm
+from jaxbiped.statistics.paired import signed_rank, success_difference
 from jaxbiped.statistics.schema import CODES, STRATEGIES
 from tests.study.synthetic import rows
 

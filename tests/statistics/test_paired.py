@@ -8,10 +8,10 @@ import pytest
 from scipy import stats
 
 from jaxbiped.statistics.intervals import paired_difference
+from jaxbiped.statistics.multiple_testing import holm
 from jaxbiped.statistics.paired import (
     equivalent_mean,
     equivalent_success,
-    holm,
     improvement,
     mcnemar,
     metric_difference,

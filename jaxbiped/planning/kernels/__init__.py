@@ -7,7 +7,7 @@ lazy_package(
     {
         "edge_direction": "crossing_faces",
         "heading": "solve_headings",
-        "map_search": "ABANDONED COST_ONLY FOUND",
+        "map_astar": "ABANDONED COST_ONLY FOUND",
         "names": "LANES METHODS",
         "solvers": "aligned solve_arrays solve_edges solve_grids solve_maps target",
     },

@@ -12,7 +12,7 @@ from numba import carray, njit
 
 from jaxbiped.core import xla_ffi
 from jaxbiped.core.ready_programs import TARGETS
-from jaxbiped.planning.kernels import dijkstra, grids, line_sweep, map_dijkstra, map_search
+from jaxbiped.planning.kernels import dijkstra, grids, line_sweep, map_astar, map_dijkstra
 from jaxbiped.planning.kernels.line_sweep import LANES
 from jaxbiped.planning.kernels.names import METHODS as METHODS
 
@@ -68,7 +68,7 @@ GRIDS, MAPS = "grids", "maps"  # straight from grids: line sweeps, and Dijkstra
 
 
 READ, SEARCH = "read", "search"  # one map, and paths on it
-WHOLE = {GRIDS: grids.solver, MAPS: map_dijkstra.solver, READ: map_search.reader, SEARCH: map_search.searcher}
+WHOLE = {GRIDS: grids.solver, MAPS: map_dijkstra.solver, READ: map_astar.reader, SEARCH: map_astar.searcher}
 
 
 def target(kernel: str) -> tuple[str, int]:
