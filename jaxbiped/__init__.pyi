@@ -30,12 +30,12 @@ from jaxbiped.arenas.scene import BoxConfig as _BoxConfig
 from jaxbiped.arenas.scene import SceneConfig as _SceneConfig
 from jaxbiped.arenas.scene import to_arena as to_arena
 from jaxbiped.arenas.source import Family as Family
+from jaxbiped.core.class_grid import ClassGrid as ClassGrid
 from jaxbiped.errors import InputError as InputError
 from jaxbiped.executors.built_in import Kinematic as Kinematic
 from jaxbiped.executors.built_in import Sampled as Sampled
 from jaxbiped.executors.execution import Execution as Execution
 from jaxbiped.executors.execution import Executor as Executor
-from jaxbiped.mapping.class_grid import ClassGrid as ClassGrid
 from jaxbiped.mapping.grid import Cell as Cell
 from jaxbiped.mission.config import CostConfig as CostConfig
 from jaxbiped.mission.config import MissionConfig as MissionConfig
