@@ -45,11 +45,13 @@ class PathSearch:
       costs, rules: scalars, as for `field`; the paper's by default.
 
     Raises:
-      InputError: an argument of another rank, shape or dtype, or a value out of range; a negative cost or NaN.
+      InputError: an argument of another rank, shape or dtype, or a value out of range; a negative cost or NaN; inside
+        `jit`, `vmap` or `scan`.
     """
 
     def __init__(self, classes: Any, levels: Any, costs: Costs | None = None, rules: Rules | None = None):
         batch, given = grid_arguments(classes, levels, costs or Costs(), rules or Rules())
+        refuse_traced("classes, levels, costs and rules", given)
         if batch:
             raise InputError("must be one map [H, W]", field="classes", value=list(np.shape(classes)))
         self.classes, self.levels, self.costs, self.rules = jax.tree.map(lambda leaf: np.asarray(leaf)[0], given)
@@ -74,6 +76,7 @@ class PathSearch:
         Raises:
           InputError: an argument of another shape or dtype, or a heading that is not a direction.
         """
+        refuse_traced("heading", heading)
         heading = int(indices("heading", heading))
         answer, cost, expanded, moves = self._search(start_ij, goal_ij, heading)
         if answer == map_astar.ABANDONED:
@@ -106,6 +109,7 @@ class PathSearch:
         return answer, float(np.float32(cost[0])), expanded, moves[:length].copy()
 
     def _cell(self, name: str, value) -> Int[np.ndarray, "2"]:
+        refuse_traced(name, value)
         found = np.asarray(cells(name, value))
         if found.shape != (2,):
             raise InputError("must be one cell [2]", field=name, value=list(found.shape))
@@ -130,6 +134,13 @@ class PathSearch:
         worse = np.where(level[1:] != level[:-1], np.maximum(worse, STEP), worse)
         prices = self._prices[moves % 2, worse].astype(np.float64)
         return ShortestPath(cells_ij, moves, np.concatenate([[0.0], np.cumsum(prices)]), cost, expanded)
+
+
+def refuse_traced(name: str, value: Any) -> None:
+    """Raise `InputError` inside `jit`, `vmap` and `scan`, where a search cannot run."""
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(value)):
+        message = "must be concrete, since a search runs on the host; inside jit, vmap and scan use field and read_path"
+        raise InputError(message, field=name)
 
 
 def shortest_path(

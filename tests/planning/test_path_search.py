@@ -187,3 +187,12 @@ def test_bad_input(change, said):
     }
     with pytest.raises(InputError, match=said):
         shortest_path(**given | change)
+
+
+def test_inside_jit_it_says_what_to_use():
+    classes = np.ones((5, 6), np.int8)
+    with pytest.raises(InputError, match=r"classes, .*must be concrete.* use field and read_path"):
+        jax.jit(lambda grid: shortest_path(grid, 0 * classes, start_ij=(0, 0), goal_ij=(4, 5)).cost)(classes)
+    search = PathSearch(classes, 0 * classes)
+    with pytest.raises(InputError, match="start_ij: must be concrete"):
+        jax.vmap(lambda cell: search.cost(cell, (4, 5)))(np.zeros((3, 2), int))
