@@ -106,7 +106,9 @@ class PathSearch:
         with self._lock:
             xla_ffi.call(name, arguments, (moves, cost, told, *self._rooms))
         length, answer, expanded = told.tolist()
-        return answer, float(np.float32(cost[0])), expanded, moves[:length].copy()
+        with np.errstate(over="ignore"):  # beyond float32 it is inf, as in a field
+            rounded = float(cost.astype(np.float32)[0])
+        return answer, rounded, expanded, moves[:length].copy()
 
     def _cell(self, name: str, value) -> Int[np.ndarray, "2"]:
         refuse_traced(name, value)

@@ -141,6 +141,29 @@ def test_ends_outside_and_on_obstacles_and_one_cell():
     assert alone.path((0, 0), (0, 0)).cost == 0 and alone.path((0, 0), (0, 1)) is None
 
 
+@pytest.mark.parametrize(
+    "costs",
+    [
+        Costs(c0=np.inf),
+        Costs(c1=np.inf),
+        Costs(c2=np.inf, c3=np.inf, c4=np.inf),
+        Costs(c0=3e38, c1=3e38),
+        Costs(c0=1e-30, c1=0.0, c4=1e30),
+    ],
+)
+def test_costs_without_bound_and_at_the_ends_of_float32(costs, recwarn):
+    rng = np.random.default_rng(10)
+    classes = rng.choice(5, size=(20, 24), p=[0.2, 0.4, 0.1, 0.2, 0.1]).astype(np.int8)
+    search = PathSearch(classes, (classes == 2).astype(np.int8), costs)
+    for start, goal in rng.integers(0, [20, 24], (40, 2, 2)):
+        grids = classes, (classes == 2).astype(np.int8), costs
+        for method in ("line_sweep", "dijkstra"):
+            there = np.asarray(planning.field(*grids, goal_ij=goal, method=method).cost)[tuple(start)]
+            assert search.cost(start, goal) == there
+        assert (search.path(start, goal) is not None) == np.isfinite(there)
+    assert not [w for w in recwarn if "overflow" in str(w.message)]
+
+
 def test_threads_share_a_map():
     rng = np.random.default_rng(8)
     classes = oracle.maze(rng, 41, 41, loops=60)

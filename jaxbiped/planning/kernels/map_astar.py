@@ -36,7 +36,7 @@ advance = expansion(directed=True)
 def rooms(height: int, width: int) -> tuple[tuple[int, type], ...]:
     """Size and dtype of the arrays that hold a map and a search on it: bytes, costs, pool, queue, touched cells."""
     size = (height + 2) * (width + 2)
-    pool = 2 * size + 16  # `room_of`
+    pool = room_of.py_func(size)  # compiling it would take longer
     return (PARTS * size, np.int8), (size, np.float64), (pool, np.int64), (QUEUE, np.int64), (size, np.int64)
 
 

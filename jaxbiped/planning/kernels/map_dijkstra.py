@@ -15,7 +15,7 @@ advance = expansion(directed=False)
 def rooms(height: int, width: int) -> tuple[tuple[int, type], ...]:
     """Size and dtype of the arrays to work in: costs, bytes, pool, queue."""
     size = (height + 2) * (width + 2)
-    pool = 2 * size + 16  # `room_of`, which would be compiled for this
+    pool = room_of.py_func(size)  # compiling it would take longer
     return (size, np.float64), (PARTS * size, np.int8), (pool, np.int64), (QUEUE, np.int64)
 
 
